@@ -1,0 +1,37 @@
+//! What the world is made of: cameras, images, bodies, poses, avatars. Types with their invariants, no formats.
+
+pub mod avatar;
+pub mod body;
+pub mod camera;
+pub mod image;
+pub mod pose;
+pub mod posed;
+pub mod skin_weights;
+
+pub use avatar::{Avatar, Binding, FaceBinding, Gaussians};
+pub use body::{Body, JointTransform, PosedBody, PosedMesh, RestBody, ShapeSpace, Skeleton, Uv};
+pub use camera::Camera;
+pub use image::{Image, Mask};
+pub use pose::{LocalTransform, Pose};
+pub use posed::{ColourClamp, Posed, Rendered};
+pub use skin_weights::SkinWeights;
+
+/// A scene value that breaks an invariant. `field` names the part, `expected` says what it should have been; the data
+/// layer adds the file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{field}: {problem}; expected {expected}")]
+pub struct SceneError {
+    /// Which field is wrong, with an index where there is one ("weights[17]").
+    pub field: String,
+    /// What is wrong with it.
+    pub problem: String,
+    /// What was expected instead.
+    pub expected: String,
+}
+
+impl SceneError {
+    /// Builds an error from its three parts.
+    pub fn new(field: impl Into<String>, problem: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self { field: field.into(), problem: problem.into(), expected: expected.into() }
+    }
+}

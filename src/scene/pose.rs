@@ -1,0 +1,55 @@
+//! A pose: one local transform per skeleton node, and a translation of the whole body.
+
+use super::Skeleton;
+use glam::{DAffine3, DQuat, DVec3};
+
+/// Translation, rotation and scale of a node relative to its parent, applied in the order scale, rotation, translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalTransform {
+    /// Metres.
+    pub translation: DVec3,
+    /// Unit quaternion.
+    pub rotation: DQuat,
+    /// Factor per axis.
+    pub scale: DVec3,
+}
+
+impl LocalTransform {
+    /// No motion.
+    pub const IDENTITY: Self =
+        Self { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
+
+    /// As an affine map.
+    pub fn to_affine(self) -> DAffine3 {
+        DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+    }
+}
+
+/// The state of a skeleton in one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pose {
+    /// One per skeleton node, replacing the node's rest transform (SMPL: rest offset and `exp(theta_j)`).
+    pub locals: Vec<LocalTransform>,
+    /// Added to every vertex after skinning, metres (SMPL `transl`).
+    pub translation: DVec3,
+    /// Per node, `R(theta_j) - I` drives the pose blend shapes; `None` for rigs that have none.
+    pub blend_shape_rotations: Option<Vec<DQuat>>,
+}
+
+impl Pose {
+    /// The rest pose of a skeleton.
+    pub fn rest(skeleton: &Skeleton) -> Self {
+        Self { locals: skeleton.rest_locals.clone(), translation: DVec3::ZERO, blend_shape_rotations: None }
+    }
+
+    /// A pose of an SMPL-style skeleton (identity rest rotations) from axis-angle vectors, radians, one per joint.
+    /// Missing joints keep their rest transform.
+    pub fn from_axis_angles(skeleton: &Skeleton, axis_angles: &[DVec3], translation: DVec3) -> Self {
+        let rotations: Vec<DQuat> = axis_angles.iter().map(|&r| DQuat::from_scaled_axis(r)).collect();
+        let mut locals = skeleton.rest_locals.clone();
+        for (local, rotation) in locals.iter_mut().zip(&rotations) {
+            local.rotation = *rotation;
+        }
+        Self { locals, translation, blend_shape_rotations: Some(rotations) }
+    }
+}

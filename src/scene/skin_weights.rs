@@ -1,0 +1,117 @@
+//! Skinning weights in compressed rows: any number of influences per vertex or Gaussian.
+
+use super::SceneError;
+
+/// Joint indices and weights of each row (vertex or Gaussian). Rows sum to one within [`SkinWeights::SUM_TOLERANCE`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct SkinWeights {
+    offsets: Vec<u32>,
+    joints: Vec<u16>,
+    weights: Vec<f32>,
+}
+
+impl SkinWeights {
+    /// How far a row's sum may be from one (16-bit normalised files are off by 3e-5). Values are kept as given.
+    pub const SUM_TOLERANCE: f64 = 1e-3;
+
+    /// Builds the table from rows of (joint, weight), dropping exact zeros.
+    ///
+    /// # Errors
+    /// A joint index out of range, a negative or non-finite weight, an empty row or a row that does not sum to one; the
+    /// field names the row.
+    pub fn from_rows<R>(rows: impl IntoIterator<Item = R>, num_joints: usize) -> Result<Self, SceneError>
+    where
+        R: IntoIterator<Item = (usize, f32)>,
+    {
+        let mut table = Self { offsets: vec![0], joints: Vec::new(), weights: Vec::new() };
+        for (i, row) in rows.into_iter().enumerate() {
+            let mut sum = 0.0f64;
+            for (joint, weight) in row {
+                if !(weight.is_finite() && weight >= 0.0) {
+                    let expected = "a finite number, at least 0";
+                    return Err(SceneError::new(
+                        format!("weights[{i}]"),
+                        format!("weight {weight}"),
+                        expected,
+                    ));
+                }
+                if weight == 0.0 {
+                    continue;
+                }
+                if joint >= num_joints || joint > usize::from(u16::MAX) {
+                    let expected = format!("an index below {num_joints}");
+                    return Err(SceneError::new(format!("joints[{i}]"), format!("joint {joint}"), expected));
+                }
+                sum += f64::from(weight);
+                table.joints.push(joint as u16);
+                table.weights.push(weight);
+            }
+            if (sum - 1.0).abs() > Self::SUM_TOLERANCE {
+                return Err(SceneError::new(format!("weights[{i}]"), format!("sum {sum}"), "a sum of 1"));
+            }
+            table.offsets.push(table.joints.len() as u32);
+        }
+        Ok(table)
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// True if there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The joints and weights of row `i`, in stored order.
+    pub fn row(&self, i: usize) -> (&[u16], &[f32]) {
+        let range = self.offsets[i] as usize..self.offsets[i + 1] as usize;
+        (&self.joints[range.clone()], &self.weights[range])
+    }
+
+    /// The largest number of influences in any row.
+    pub fn max_influences(&self) -> usize {
+        self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
+    }
+
+    /// The convex combination `Σ coefficient * row` as sorted (joint, weight) pairs, accumulated in f64.
+    pub fn mixed(&self, rows: &[(usize, f64)]) -> Vec<(usize, f32)> {
+        let mut sum = std::collections::BTreeMap::new();
+        for &(row, coefficient) in rows {
+            let (joints, weights) = self.row(row);
+            for (&joint, &weight) in joints.iter().zip(weights) {
+                *sum.entry(usize::from(joint)).or_insert(0.0f64) += coefficient * f64::from(weight);
+            }
+        }
+        sum.into_iter().map(|(joint, weight)| (joint, weight as f32)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_keep_their_order_and_lose_zeros() {
+        let weights =
+            SkinWeights::from_rows([vec![(2, 0.75), (0, 0.0), (1, 0.25)], vec![(0, 1.0)]], 3).unwrap();
+        assert_eq!(weights.row(0), (&[2u16, 1][..], &[0.75f32, 0.25][..]));
+        assert_eq!((weights.len(), weights.max_influences()), (2, 2));
+        assert_eq!(weights.mixed(&[(0, 0.5), (1, 0.5)]), vec![(0, 0.5), (1, 0.125), (2, 0.375)]);
+    }
+
+    #[test]
+    fn bad_rows_are_named() {
+        for (row, field) in [
+            (vec![(0, 0.5)], "weights[1]"),
+            (vec![], "weights[1]"),
+            (vec![(0, f32::NAN)], "weights[1]"),
+            (vec![(0, -1.0), (1, 2.0)], "weights[1]"),
+            (vec![(3, 1.0)], "joints[1]"),
+        ] {
+            let error = SkinWeights::from_rows([vec![(0, 1.0)], row], 3).unwrap_err();
+            assert_eq!(error.field, field, "{error}");
+        }
+    }
+}
