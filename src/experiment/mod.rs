@@ -31,7 +31,7 @@ pub use metric::Metric;
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
 pub use plan::{AvatarBuild, Job, JobVariant, Plan, PlannedTable, plan};
 pub use profile::{Options, Profile, Subset, evenly_spaced};
-pub use record::{FrameRecord, FrameScore, Outcome, Records, Seconds};
+pub use record::{FrameRecord, Outcome, Records, Seconds};
 pub use rows::{DataRow, Source};
 pub use shard::Shard;
 pub use spec::{AvatarRecipe, Average, Column, Experiment, Layout, StandIn, Variant};

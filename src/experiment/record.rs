@@ -1,5 +1,6 @@
 //! What a job leaves behind: one record per frame and variant.
 
+use crate::metrics::FrameScore;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -23,22 +24,6 @@ impl PartialEq for FrameRecord {
     fn eq(&self, other: &Self) -> bool {
         self.key == other.key && self.outcome == other.outcome
     }
-}
-
-/// Local mirror until the metrics branch lands.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FrameScore {
-    /// Pixels.
-    pub pixels: u64,
-    /// Mean squared error.
-    pub mse: f64,
-    /// PSNR.
-    pub psnr: f64,
-    /// SSIM.
-    pub ssim: f64,
-    /// LPIPS.
-    pub lpips: Option<f64>,
 }
 
 /// Score or failure of a frame.
