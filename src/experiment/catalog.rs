@@ -1,27 +1,23 @@
-//! Protocols and strategies by name: what the layers below call a spec, in full, for the content keys.
+//! Protocols and strategies by their specs: the one place where experiments meet the layers that define them.
 
-use serde_json::{Value, json};
+use crate::metrics::{MetricsError, Protocol};
+use serde_json::Value;
 
-/// A scoring protocol.
-pub(super) struct Protocol {
-    /// `id@version`.
-    pub(super) name: String,
-    /// Every choice that it makes.
-    pub(super) content: Value,
-}
-
-/// The protocol of this id.
+/// The protocol of a spec.
 ///
 /// # Errors
-/// The ids that are known.
-pub(super) fn protocol(id: &str) -> Result<Protocol, String> {
-    Ok(Protocol { name: format!("{id}@1"), content: json!({ "id": id, "version": 1 }) })
+/// What is wrong with the spec, and what is known.
+pub(super) fn protocol(spec: &str) -> Result<Protocol, (String, String)> {
+    Protocol::parse(spec).map_err(|error| match error {
+        MetricsError::Protocol { problem, expected, .. } => (format!("`{spec}`: {problem}"), expected),
+        other => (format!("`{spec}`: {other}"), "a valid protocol".to_owned()),
+    })
 }
 
-/// The strategy of this spec in full.
+/// The strategy of a spec, in full.
 ///
 /// # Errors
-/// What a spec looks like.
-pub(super) fn strategy(spec: &str) -> Result<Value, String> {
+/// What is wrong with the spec, and what is known.
+pub(super) fn strategy(spec: &str) -> Result<Value, (String, String)> {
     Ok(Value::String(spec.to_owned()))
 }

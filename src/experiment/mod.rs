@@ -6,14 +6,13 @@
 //! depend on. A [`FrameRecord`] is what a job leaves behind. Nothing in this layer renders, and nothing reads a file
 //! but [`Experiment::load`] and [`Experiment::load_folder`].
 //!
-//! A further table is a further TOML file; a further column is one arm in [`Metric`].
+//! A further table is a further TOML file; a further column is one arm in [`MetricKind`](crate::metrics::MetricKind).
 
 mod catalog;
 mod dataset;
 mod embedded;
 mod error;
 mod key;
-mod metric;
 mod paper;
 mod plan;
 mod profile;
@@ -27,7 +26,6 @@ pub use dataset::{AvatarFile, Capture, Dataset, FrameInfo, Role, SequenceInfo, S
 pub use embedded::EMBEDDED;
 pub use error::Error;
 pub use key::{CodeVersions, canonical_json, content_key};
-pub use metric::Metric;
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
 pub use plan::{AvatarBuild, Job, JobVariant, Plan, PlannedTable, plan};
 pub use profile::{Options, Profile, Subset, evenly_spaced};

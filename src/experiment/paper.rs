@@ -1,6 +1,7 @@
 //! What the paper printed, digit by digit, and how its comparisons split the data.
 
-use super::{FrameInfo, Metric, Role};
+use super::{FrameInfo, Role};
+use crate::metrics::MetricKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -137,7 +138,7 @@ pub struct PaperRow {
     #[serde(default)]
     pub splats: Option<Printed>,
     /// The metrics that are printed in bold.
-    pub bold: Vec<Metric>,
+    pub bold: Vec<MetricKind>,
     /// Why a number of the row is probably a slip.
     #[serde(default)]
     pub doubt: Option<String>,
@@ -148,12 +149,12 @@ pub struct PaperRow {
 
 impl PaperRow {
     /// The printed number of a metric.
-    pub fn value(&self, metric: Metric) -> Option<&Printed> {
+    pub fn value(&self, metric: MetricKind) -> Option<&Printed> {
         match metric {
-            Metric::Psnr => self.psnr.as_ref(),
-            Metric::Ssim => self.ssim.as_ref(),
-            Metric::Lpips => self.lpips.as_ref(),
-            Metric::Splats => self.splats.as_ref(),
+            MetricKind::Psnr => self.psnr.as_ref(),
+            MetricKind::Ssim => self.ssim.as_ref(),
+            MetricKind::Lpips => self.lpips.as_ref(),
+            MetricKind::Splats => self.splats.as_ref(),
         }
     }
 }

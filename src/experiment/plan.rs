@@ -1,11 +1,11 @@
 //! From experiments and data to jobs: pure, no file is opened.
 
-use super::catalog::{self, Protocol};
 use super::rows::{DataRow, Source, rows_of};
 use super::{
     AvatarRecipe, CodeVersions, Dataset, Error, Experiment, Options, SequenceInfo, Shard, SubjectInfo,
     Variant, content_key,
 };
+use crate::metrics::{Protocol, ProtocolId};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -58,8 +58,8 @@ pub struct PlannedTable {
     pub rows: Vec<DataRow>,
     /// Ids of the variants that take part, in the experiment's order.
     pub variants: Vec<String>,
-    /// The scoring protocol, `id@version`.
-    pub protocol: String,
+    /// The scoring protocol.
+    pub protocol: ProtocolId,
 }
 
 /// An avatar to be made or read before its jobs can run.
@@ -101,7 +101,7 @@ pub struct Job {
     pub frame: usize,
     /// Name of the frame.
     pub name: String,
-    /// Id of the scoring protocol.
+    /// Spec of the scoring protocol.
     pub protocol: String,
     /// Longer side to which the frame is reduced, pixels; native if absent.
     pub resolution: Option<u32>,
@@ -163,9 +163,9 @@ struct Builder<'a> {
 impl Builder<'_> {
     /// One table; its jobs and avatars are added to the builder's.
     fn table(&mut self, index: usize, experiment: &Experiment) -> Result<PlannedTable, Error> {
-        let protocol = catalog::protocol(&experiment.protocol)
-            .map_err(|expected| unknown(experiment, "protocol", &experiment.protocol, expected))?;
         let (source, rows) = rows_of(experiment, self.datasets, self.options);
+        let invalid = |(problem, expected)| Error::invalid(&experiment.id, "protocol", problem, expected);
+        let protocol = catalog::protocol(experiment.protocol_on(source)).map_err(invalid)?;
         let wanted = &self.options.subset.variants;
         let variants: Vec<(usize, &Variant)> = (experiment.variants.iter().enumerate())
             .filter(|(_, variant)| wanted.is_empty() || wanted.contains(&variant.id))
@@ -185,7 +185,7 @@ impl Builder<'_> {
             datasets,
             rows,
             variants: variants.iter().map(|(_, variant)| variant.id.clone()).collect(),
-            protocol: protocol.name,
+            protocol: protocol.key(),
         })
     }
 
@@ -197,15 +197,14 @@ impl Builder<'_> {
         variant: &Variant,
         row: &DataRow,
     ) -> Result<Prepared, Error> {
-        let key = |field: &str| format!("variants[{index}].{field}");
+        let invalid = |field: &str, (problem, expected): (String, String)| {
+            Error::invalid(&experiment.id, format!("variants[{index}].{field}"), problem, expected)
+        };
         let strategy = match &variant.strategy {
             None => serde_json::Value::Null,
-            Some(spec) => catalog::strategy(spec)
-                .map_err(|expected| unknown(experiment, key("strategy"), spec, expected))?,
+            Some(spec) => catalog::strategy(spec).map_err(|why| invalid("strategy", why))?,
         };
-        let avatar = self.avatar(variant, row).map_err(|(problem, expected)| {
-            Error::invalid(&experiment.id, key("avatar"), problem, expected)
-        })?;
+        let avatar = self.avatar(variant, row).map_err(|why| invalid("avatar", why))?;
         Ok(Prepared { variant: variant.clone(), avatar, strategy })
     }
 
@@ -264,11 +263,12 @@ impl Builder<'_> {
     ) {
         let test = find_sequence(self.subject(row), &row.sequence).clone();
         let resolution = self.options.profile.resolution;
+        let choices = Protocol { title: String::new(), source: String::new(), ..protocol.clone() };
         for &frame in &row.frames {
             let variants = variants.iter().map(|prepared| {
                 let content = json!({
                     "code": CodeVersions::CURRENT, "test": test.digest, "frame": frame,
-                    "avatar": prepared.avatar, "strategy": prepared.strategy, "protocol": protocol.content,
+                    "avatar": prepared.avatar, "strategy": prepared.strategy, "protocol": choices,
                     "antialiased": experiment.antialiased, "resolution": resolution,
                 });
                 JobVariant {
@@ -286,7 +286,7 @@ impl Builder<'_> {
                 sequence: row.sequence.clone(),
                 frame,
                 name: test.frames[frame].name.clone(),
-                protocol: experiment.protocol.clone(),
+                protocol: protocol.id.clone(),
                 resolution,
                 antialiased: experiment.antialiased,
                 variants: variants.collect(),
@@ -312,10 +312,6 @@ struct Prepared {
 
 fn find_sequence<'a>(subject: &'a SubjectInfo, id: &str) -> &'a SequenceInfo {
     subject.sequences.iter().find(|sequence| sequence.id == id).expect("rows name sequences of their subject")
-}
-
-fn unknown(experiment: &Experiment, key: impl Into<String>, id: &str, expected: String) -> Error {
-    Error::invalid(&experiment.id, key, format!("`{id}`"), expected)
 }
 
 /// Refuses a subset that would leave nothing because of a name that does not exist.

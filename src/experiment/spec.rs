@@ -1,6 +1,7 @@
 //! The experiment file: one table, described as data.
 
-use super::{Capture, EMBEDDED, Error, Metric, Paper, Split, validate};
+use super::{Capture, EMBEDDED, Error, Paper, Source, Split, validate};
+use crate::metrics::MetricKind;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -24,7 +25,7 @@ pub struct Experiment {
     pub dataset_title: String,
     /// The stock method that the table is about.
     pub method: String,
-    /// Id of the scoring protocol.
+    /// The scoring protocol: a preset's id, or a preset with other choices, such as `haha+ssim=torchmetrics-1.4`.
     pub protocol: String,
     /// Whether the antialiased rasterizer renders.
     #[serde(default)]
@@ -80,6 +81,9 @@ pub struct StandIn {
     pub capture: Capture,
     /// Caption of a table made from stand-in data; it must not name the table's own data set.
     pub caption: String,
+    /// Scoring protocol of the stand-in where the table's own does not fit it; the table's own if absent.
+    #[serde(default)]
+    pub protocol: Option<String>,
     /// Ids of the sequences from which avatars are made (the first that a subject has is taken); its first training
     /// sequence if empty.
     #[serde(default)]
@@ -94,7 +98,7 @@ pub struct StandIn {
 #[serde(deny_unknown_fields)]
 pub struct Column {
     /// The metric.
-    pub metric: Metric,
+    pub metric: MetricKind,
     /// Title; the metric's usual one if absent.
     #[serde(default)]
     pub title: Option<String>,
@@ -226,6 +230,12 @@ impl Experiment {
     /// The variant of this id.
     pub fn variant(&self, id: &str) -> Option<&Variant> {
         self.variants.iter().find(|variant| variant.id == id)
+    }
+
+    /// The scoring protocol on data of this source.
+    pub fn protocol_on(&self, source: Source) -> &str {
+        let other = self.stand_in.as_ref().and_then(|stand_in| stand_in.protocol.as_deref());
+        if source == Source::StandIn { other.unwrap_or(&self.protocol) } else { &self.protocol }
     }
 
     /// The experiment with a further row for each of the given strategies `(id, title)` that no variant has yet. The

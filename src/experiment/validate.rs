@@ -1,6 +1,6 @@
 //! Checks of an experiment that its types cannot make.
 
-use super::{AvatarRecipe, Error, Experiment, Paper, Role, Split, Variant};
+use super::{AvatarRecipe, Error, Experiment, Paper, Role, Split, Variant, catalog};
 use std::collections::BTreeSet;
 
 /// Checks one experiment.
@@ -13,10 +13,16 @@ pub(super) fn experiment(e: &Experiment, file: &str) -> Result<(), Error> {
             "1, the version of the format that this program reads",
         );
     }
-    for (key, id) in [("id", &e.id), ("dataset", &e.dataset), ("protocol", &e.protocol)] {
+    for (key, id) in [("id", &e.id), ("dataset", &e.dataset)] {
         if !is_id(id) {
             return fail(key, format!("`{id}`"), "lower-case letters, digits, `-` and `_`, not empty");
         }
+    }
+    let other = e.stand_in.as_ref().and_then(|stand_in| stand_in.protocol.as_deref());
+    let specs = [("protocol", Some(e.protocol.as_str())), ("stand_in.protocol", other)];
+    for (key, spec) in specs.into_iter().filter_map(|(key, spec)| Some((key, spec?))) {
+        catalog::protocol(spec)
+            .map_err(|(problem, expected)| Error::invalid(file, key, problem, expected))?;
     }
     if let Some(stem) = stem(file)
         && stem != e.id

@@ -1,6 +1,7 @@
 //! The table as a value: the one thing that Markdown, CSV, JSON and LaTeX are written from.
 
-use crate::experiment::{Metric, Source};
+use crate::experiment::Source;
+use crate::metrics::MetricKind;
 use serde::{Deserialize, Serialize};
 
 /// A table, ready to be written in any format.
@@ -40,7 +41,7 @@ pub struct TableColumn {
     /// Heading.
     pub title: String,
     /// The metric.
-    pub metric: Metric,
+    pub metric: MetricKind,
     /// Digits after the point.
     pub decimals: usize,
 }
@@ -176,7 +177,7 @@ fn round(value: f64, decimals: usize) -> String {
 /// Marks the best cells of each column among rows that compare with each other. Equal digits are equally good. Nothing
 /// is marked in a column where a number is missing or rests on fewer frames than planned, or where there is only one
 /// number: there the rows do not compare.
-pub fn mark_best(rows: &mut [&mut Vec<Cell>], columns: &[(Metric, usize)]) {
+pub fn mark_best(rows: &mut [&mut Vec<Cell>], columns: &[(MetricKind, usize)]) {
     for (c, (metric, _)) in columns.iter().enumerate() {
         let values: Vec<f64> = rows.iter().filter_map(|cells| cells[c].printed()).collect();
         let comparable = rows.iter().all(|cells| {
@@ -202,7 +203,7 @@ mod tests {
         Cell::new(Content::number(value), decimals)
     }
 
-    fn bests(metric: Metric, cells: Vec<Cell>) -> Vec<bool> {
+    fn bests(metric: MetricKind, cells: Vec<Cell>) -> Vec<bool> {
         let mut rows: Vec<Vec<Cell>> = cells.into_iter().map(|cell| vec![cell]).collect();
         mark_best(&mut rows.iter_mut().collect::<Vec<_>>(), &[(metric, 0)]);
         rows.iter().map(|cells| cells[0].best).collect()
@@ -210,22 +211,22 @@ mod tests {
 
     #[test]
     fn digits_decide_and_ties_are_both_best() {
-        assert_eq!(bests(Metric::Psnr, vec![number(22.071, 2), number(22.069, 2)]), [true, true]);
-        assert_eq!(bests(Metric::Psnr, vec![number(22.07, 2), number(22.08, 2)]), [false, true]);
-        assert_eq!(bests(Metric::Lpips, vec![number(0.1, 4), number(0.2, 4)]), [true, false]);
-        assert_eq!(bests(Metric::Splats, vec![number(10.0, 0), number(9.0, 0)]), [false, true]);
-        assert_eq!(bests(Metric::Psnr, vec![number(f64::INFINITY, 2), number(90.0, 2)]), [true, false]);
+        assert_eq!(bests(MetricKind::Psnr, vec![number(22.071, 2), number(22.069, 2)]), [true, true]);
+        assert_eq!(bests(MetricKind::Psnr, vec![number(22.07, 2), number(22.08, 2)]), [false, true]);
+        assert_eq!(bests(MetricKind::Lpips, vec![number(0.1, 4), number(0.2, 4)]), [true, false]);
+        assert_eq!(bests(MetricKind::Splats, vec![number(10.0, 0), number(9.0, 0)]), [false, true]);
+        assert_eq!(bests(MetricKind::Psnr, vec![number(f64::INFINITY, 2), number(90.0, 2)]), [true, false]);
     }
 
     #[test]
     fn rows_that_do_not_compare_have_no_best() {
         let short = Cell { missing: 1, ..number(30.0, 2) };
-        assert_eq!(bests(Metric::Psnr, vec![short, number(20.0, 2)]), [false, false]);
+        assert_eq!(bests(MetricKind::Psnr, vec![short, number(20.0, 2)]), [false, false]);
         let none = Cell::new(Content::NotComputed, 4);
-        assert_eq!(bests(Metric::Lpips, vec![none.clone(), number(0.1, 4)]), [false, false]);
-        assert_eq!(bests(Metric::Lpips, vec![none.clone(), none]), [false, false]);
-        assert_eq!(bests(Metric::Splats, vec![Cell::empty(), number(9.0, 0)]), [false, false]);
-        assert_eq!(bests(Metric::Splats, vec![Cell::empty(), number(9.0, 0), number(8.0, 0)]), [false, false, true]);
+        assert_eq!(bests(MetricKind::Lpips, vec![none.clone(), number(0.1, 4)]), [false, false]);
+        assert_eq!(bests(MetricKind::Lpips, vec![none.clone(), none]), [false, false]);
+        assert_eq!(bests(MetricKind::Splats, vec![Cell::empty(), number(9.0, 0)]), [false, false]);
+        assert_eq!(bests(MetricKind::Splats, vec![Cell::empty(), number(9.0, 0), number(8.0, 0)]), [false, false, true]);
     }
 
     #[test]
