@@ -3,7 +3,7 @@
 use super::rows::{DataRow, Source, rows_of};
 use super::{
     AvatarRecipe, CodeVersions, Dataset, Error, Experiment, Options, SequenceInfo, Shard, SubjectInfo,
-    Variant, content_key,
+    Variant, catalog, content_key,
 };
 use crate::metrics::{Protocol, ProtocolId};
 use serde::Serialize;
