@@ -86,8 +86,12 @@ impl Triangle {
     /// sample just outside of the exact triangle: the coordinates are clamped to it.
     pub(super) fn barycentric_at(&self, x: f64, y: f64) -> [f64; 3] {
         let raw = self.barycentric.map(|plane| plane.at(x, y));
-        let sum: f64 = raw.iter().sum();
-        let inside = raw.map(|b| (b / sum).max(0.0));
+        let scale = 1.0 / (raw[0] + raw[1] + raw[2]);
+        let exact = raw.map(|b| b * scale);
+        if exact.iter().all(|&b| b >= 0.0) {
+            return exact;
+        }
+        let inside = exact.map(|b| b.max(0.0));
         let total: f64 = inside.iter().sum();
         // a face seen exactly edge-on has no ray through its inside
         if total.is_finite() && total > 0.0 { inside.map(|b| b / total) } else { [1.0 / 3.0; 3] }

@@ -21,7 +21,7 @@ impl Texture {
         &self.texels
     }
 
-    /// The bilinearly interpolated texel at (u, v). Coordinates that are not finite read the bottom left texel.
+    /// The bilinearly interpolated texel at (u, v). A NaN reads the left or the top border.
     pub fn sample(&self, [u, v]: [f32; 2]) -> [f32; 3] {
         let (left, right, fx) = neighbours(u, self.texels.width());
         let (top, bottom, fy) = neighbours(1.0 - v, self.texels.height());
@@ -54,4 +54,34 @@ fn neighbours(coordinate: f32, size: usize) -> (usize, usize, f32) {
     let first = position as usize;
     let fraction = position - first as f32;
     (first, (first + 1).min(size - 1), if fraction.is_finite() { fraction } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two columns and two rows; v points up, so the first row is the one at v = 1.
+    fn checker() -> Texture {
+        let pixels = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 1.0]];
+        Texture::new(Image::new(2, 2, pixels).unwrap())
+    }
+
+    #[test]
+    fn texel_centres_read_texels_and_v_points_up() {
+        let texture = checker();
+        assert_eq!(texture.sample([0.25, 0.75]), [0.0, 0.0, 0.0]);
+        assert_eq!(texture.sample([0.75, 0.75]), [1.0, 0.0, 0.0]);
+        assert_eq!(texture.sample([0.25, 0.25]), [0.0, 1.0, 0.0]);
+        assert_eq!(texture.sample([0.75, 0.25]), [1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn between_texels_it_is_bilinear_and_outside_the_border_is_repeated() {
+        let texture = checker();
+        assert_eq!(texture.sample([0.5, 0.5]), [0.5, 0.5, 0.25]);
+        assert_eq!(texture.sample([0.375, 0.75]), [0.25, 0.0, 0.0]);
+        assert_eq!(texture.sample([-3.0, 7.0]), texture.sample([0.25, 0.75]));
+        assert_eq!(texture.sample([f32::NAN, f32::NAN]), [0.0, 0.0, 0.0]);
+        assert!(texture.sample([f32::INFINITY, f32::NEG_INFINITY]).iter().all(|c| c.is_finite()));
+    }
 }
