@@ -1,1 +1,35 @@
-//! (layer in construction)
+//! Experiments as data: `experiments/*.toml` and descriptions of the data at hand become a [`Plan`].
+//!
+//! An [`Experiment`] says what one table asks: which data set, variants, protocol and columns, and what the paper
+//! printed. [`plan()`] is a pure function of experiments, [`Dataset`] descriptions and [`Options`]; it yields avatar
+//! builds and one [`Job`] per test frame, each with a content key that changes when anything changes that its numbers
+//! depend on. A [`FrameRecord`] is what a job leaves behind. Nothing in this layer renders, and nothing reads a file
+//! but [`Experiment::load`] and [`Experiment::load_folder`].
+//!
+//! A further table is a further TOML file; a further column is one arm in [`MetricKind`](crate::metrics::MetricKind).
+
+mod catalog;
+mod dataset;
+mod embedded;
+mod error;
+mod key;
+mod paper;
+mod plan;
+mod profile;
+mod record;
+mod rows;
+mod shard;
+mod spec;
+mod validate;
+
+pub use dataset::{AvatarFile, Capture, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
+pub use embedded::EMBEDDED;
+pub use error::Error;
+pub use key::{CodeVersions, canonical_json, content_key};
+pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
+pub use plan::{AvatarBuild, Job, JobVariant, Plan, PlannedTable, plan};
+pub use profile::{Options, Profile, Subset, evenly_spaced};
+pub use record::{FrameRecord, Outcome, Records, Seconds};
+pub use rows::{DataRow, Source};
+pub use shard::Shard;
+pub use spec::{AvatarRecipe, Average, Column, Experiment, Layout, StandIn, Variant};

@@ -1,1 +1,3 @@
-//! (layer in construction)
+//! Executing a plan and keeping what comes out.
+
+pub mod store;

@@ -1,0 +1,23 @@
+//! Protocols and strategies by their specs: the one place where experiments meet the layers that define them.
+
+use crate::metrics::{MetricsError, Protocol};
+use serde_json::Value;
+
+/// The protocol of a spec.
+///
+/// # Errors
+/// What is wrong with the spec, and what is known.
+pub(super) fn protocol(spec: &str) -> Result<Protocol, (String, String)> {
+    Protocol::parse(spec).map_err(|error| match error {
+        MetricsError::Protocol { problem, expected, .. } => (format!("`{spec}`: {problem}"), expected),
+        other => (format!("`{spec}`: {other}"), "a valid protocol".to_owned()),
+    })
+}
+
+/// The strategy of a spec, in full.
+///
+/// # Errors
+/// What is wrong with the spec, and what is known.
+pub(super) fn strategy(spec: &str) -> Result<Value, (String, String)> {
+    Ok(Value::String(spec.to_owned()))
+}

@@ -1,0 +1,11 @@
+//! The experiment files of this repository, for a program that runs away from it.
+
+/// File name and text of each.
+pub const EMBEDDED: &[(&str, &str)] = &[
+    ("experiments/table1.toml", include_str!("../../experiments/table1.toml")),
+    ("experiments/table2.toml", include_str!("../../experiments/table2.toml")),
+    ("experiments/table3.toml", include_str!("../../experiments/table3.toml")),
+    ("experiments/table4.toml", include_str!("../../experiments/table4.toml")),
+    ("experiments/table5.toml", include_str!("../../experiments/table5.toml")),
+    ("experiments/table6.toml", include_str!("../../experiments/table6.toml")),
+];

@@ -1,0 +1,121 @@
+//! How much of the data a run looks at.
+
+use serde::{Deserialize, Serialize};
+
+/// A bound on frames and resolution. It is part of every key that it influences and of every caption.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// Id, printed in captions.
+    pub id: String,
+    /// Frames per training sequence from which an avatar is made, [`evenly_spaced`]; all if absent.
+    pub max_train_frames: Option<usize>,
+    /// Frames per test sequence that are scored, [`evenly_spaced`]; all if absent.
+    pub max_test_frames: Option<usize>,
+    /// Longer side of the scored images, pixels: larger frames are reduced to it; native if absent.
+    pub resolution: Option<u32>,
+}
+
+impl Profile {
+    /// Ids of the presets.
+    pub const IDS: [&str; 2] = ["quick", "standard"];
+
+    /// A look in minutes: 12 training and 6 test frames per sequence, images of at most 256 pixels.
+    pub fn quick() -> Self {
+        Self {
+            id: "quick".into(),
+            max_train_frames: Some(12),
+            max_test_frames: Some(6),
+            resolution: Some(256),
+        }
+    }
+
+    /// Every frame at its native resolution.
+    pub fn standard() -> Self {
+        Self { id: "standard".into(), max_train_frames: None, max_test_frames: None, resolution: None }
+    }
+
+    /// The preset of this id.
+    pub fn preset(id: &str) -> Option<Self> {
+        match id {
+            "quick" => Some(Self::quick()),
+            "standard" => Some(Self::standard()),
+            _ => None,
+        }
+    }
+}
+
+/// A part of the frames, asked for by the user. A table of a subset is marked "partial".
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Subset {
+    /// Only test frames with `start <= index < end` within their sequence (before the profile thins them out).
+    pub frames: Option<[usize; 2]>,
+    /// At most this many test frames per sequence (after the profile has thinned them out): the first ones.
+    pub limit: Option<usize>,
+    /// Only these subjects; all if empty.
+    pub subjects: Vec<String>,
+    /// Only these variants; all if empty.
+    pub variants: Vec<String>,
+}
+
+impl Subset {
+    /// True if nothing is left out.
+    pub fn is_everything(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The test frames of a sequence that are scored, in order: `chosen` (what the split leaves) cut by the subset and
+    /// thinned by the profile.
+    pub(super) fn select(&self, chosen: Vec<usize>, profile: &Profile) -> Vec<usize> {
+        let [start, end] = self.frames.unwrap_or([0, usize::MAX]);
+        let kept: Vec<usize> = chosen.into_iter().filter(|&i| start <= i && i < end).collect();
+        let thinned = evenly_spaced(&kept, profile.max_test_frames);
+        thinned.into_iter().take(self.limit.unwrap_or(usize::MAX)).collect()
+    }
+}
+
+/// What a plan is asked for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Options {
+    /// Bounds on frames and resolution.
+    pub profile: Profile,
+    /// A part of it.
+    pub subset: Subset,
+}
+
+/// At most `limit` of `items`, evenly spaced: the items are cut into `limit` equal stretches and the middle of each is
+/// taken, item `floor((2 i + 1) n / (2 limit))` for i = 0, 1, ... The choice depends on the count alone.
+pub fn evenly_spaced<T: Copy>(items: &[T], limit: Option<usize>) -> Vec<T> {
+    let n = items.len();
+    match limit {
+        Some(k) if k < n => (0..k).map(|i| items[(2 * i + 1) * n / (2 * k)]).collect(),
+        _ => items.to_vec(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_thinned_from_the_middle_of_equal_stretches() {
+        let items: Vec<usize> = (0..10).collect();
+        assert_eq!(evenly_spaced(&items, Some(5)), [1, 3, 5, 7, 9]);
+        assert_eq!(evenly_spaced(&items, Some(3)), [1, 5, 8]);
+        assert_eq!(evenly_spaced(&items, Some(1)), [5]);
+        assert_eq!(evenly_spaced(&items, Some(0)), [0; 0]);
+        assert_eq!(evenly_spaced(&items, Some(10)), items);
+        assert_eq!(evenly_spaced(&items, None), items);
+    }
+
+    #[test]
+    fn a_subset_cuts_before_and_limits_after_thinning() {
+        let subset = Subset { frames: Some([10, 20]), limit: Some(2), ..Subset::default() };
+        let profile = Profile { max_test_frames: Some(5), ..Profile::standard() };
+        assert_eq!(subset.select((0..40).collect(), &profile), [11, 13]);
+        assert!(!subset.is_everything());
+        assert!(Subset::default().is_everything());
+    }
+}

@@ -1,0 +1,59 @@
+//! What a job leaves behind: one record per frame and variant.
+
+use crate::metrics::FrameScore;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The score of one frame, rendered in one way, or why there is none.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameRecord {
+    /// The content key of the [`super::JobVariant`].
+    pub key: String,
+    /// What the frame is, for people who read the store: data set, subject, sequence, frame name, variant.
+    pub label: String,
+    /// Score or failure.
+    pub outcome: Outcome,
+    /// Seconds that it took. No result depends on them, and neither does equality.
+    #[serde(default)]
+    pub seconds: Seconds,
+}
+
+impl PartialEq for FrameRecord {
+    /// Equal results: neither labels nor times count.
+    fn eq(&self, other: &Self) -> bool {
+        self.key == other.key && self.outcome == other.outcome
+    }
+}
+
+/// Score or failure of a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// Rendered and scored.
+    Scored {
+        /// The metrics, in the protocol's variants.
+        score: FrameScore,
+        /// Gaussians in the avatar; none for a textured mesh.
+        splats: Option<u64>,
+        /// Gaussians that reach the image; none for a textured mesh.
+        visible_splats: Option<u64>,
+    },
+    /// Failed: the error, one line. The next run tries again.
+    Error(String),
+}
+
+/// Seconds spent on a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Seconds {
+    /// Posing the avatar.
+    pub pose: f64,
+    /// Rendering.
+    pub render: f64,
+    /// Scoring.
+    pub score: f64,
+}
+
+/// Records by key: what a run or a report knows.
+pub type Records = BTreeMap<String, FrameRecord>;

@@ -1,0 +1,187 @@
+//! Which sequences a table is made from, and which of their frames.
+
+use super::{
+    Dataset, Experiment, FrameInfo, Options, Role, SequenceInfo, Split, StandIn, SubjectInfo, evenly_spaced,
+};
+use serde::{Deserialize, Serialize};
+
+/// Where the numbers of a table come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// The table's own data set.
+    Own,
+    /// Other data of the same kind of capture: the numbers do not compare with the paper's.
+    StandIn,
+    /// No data: the table has no rows.
+    Absent,
+}
+
+/// A sequence of the table: one subject's test sequence, and the training frames that go with it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DataRow {
+    /// `dataset/subject/sequence`, unique in the table.
+    pub id: String,
+    /// What the table calls it.
+    pub label: String,
+    /// Data set.
+    pub dataset: String,
+    /// Subject.
+    pub subject: String,
+    /// Test sequence; empty if the row has no data.
+    pub sequence: String,
+    /// Indices of the test frames that are scored, ascending.
+    pub frames: Vec<usize>,
+    /// Training sequence and the indices of its frames; none if the subject has none.
+    pub train: Option<(String, Vec<usize>)>,
+    /// Why the row has no frames, if it has none.
+    pub missing: Option<String>,
+}
+
+/// The rows of an experiment: of its own data set if that is there, else of every subject that may stand in.
+pub(super) fn rows_of(
+    experiment: &Experiment,
+    datasets: &[Dataset],
+    options: &Options,
+) -> (Source, Vec<DataRow>) {
+    if let Some(own) = datasets.iter().find(|dataset| dataset.id == experiment.dataset) {
+        return (Source::Own, own_rows(experiment, own, options));
+    }
+    let Some(stand_in) = &experiment.stand_in else { return (Source::Absent, Vec::new()) };
+    let of_kind = |d: &&Dataset| d.subjects.iter().any(|s| s.capture == stand_in.capture);
+    let several = datasets.iter().filter(of_kind).count() > 1;
+    let mut rows = Vec::new();
+    for dataset in datasets {
+        for subject in
+            dataset.subjects.iter().filter(|s| s.capture == stand_in.capture && chosen(options, &s.id))
+        {
+            for mut row in stand_in_rows(stand_in, dataset, subject, options) {
+                if several {
+                    row.label = format!("{}: {}", dataset.id, row.label);
+                }
+                rows.push(row);
+            }
+        }
+    }
+    (if rows.is_empty() { Source::Absent } else { Source::StandIn }, rows)
+}
+
+/// True if the subset leaves the subject in.
+fn chosen(options: &Options, subject: &str) -> bool {
+    let subjects = &options.subset.subjects;
+    subjects.is_empty() || subjects.iter().any(|id| id == subject)
+}
+
+/// The experiment's sequences (subjects) in printed order; those that are not there are rows without data.
+fn own_rows(experiment: &Experiment, dataset: &Dataset, options: &Options) -> Vec<DataRow> {
+    let ids: Vec<&str> = if experiment.sequences.is_empty() {
+        dataset.subjects.iter().map(|s| s.id.as_str()).collect()
+    } else {
+        experiment.sequences.iter().map(String::as_str).collect()
+    };
+    let mut rows = Vec::new();
+    for id in ids.into_iter().filter(|id| chosen(options, id)) {
+        let subject = dataset.subjects.iter().find(|subject| subject.id == id);
+        let split = experiment.splits.iter().find(|split| split.sequence == id);
+        let found =
+            subject.map_or_else(Vec::new, |subject| own_subject_rows(dataset, subject, split, options));
+        if found.is_empty() {
+            let missing = match subject {
+                None => format!("the data set has no subject `{id}`"),
+                Some(_) => format!("no test sequence of `{id}` matches the experiment's split"),
+            };
+            rows.push(DataRow {
+                id: format!("{}/{id}", dataset.id),
+                label: id.into(),
+                dataset: dataset.id.clone(),
+                subject: id.into(),
+                sequence: String::new(),
+                frames: Vec::new(),
+                train: None,
+                missing: Some(missing),
+            });
+        }
+        rows.extend(found);
+    }
+    rows
+}
+
+/// The rows of a subject of the table's own data set. A subject with one test sequence is called by its own name, as in
+/// the paper.
+fn own_subject_rows(
+    dataset: &Dataset,
+    subject: &SubjectInfo,
+    split: Option<&Split>,
+    options: &Options,
+) -> Vec<DataRow> {
+    let plays = |sequence: &&SequenceInfo, role: Role| match split.and_then(|split| split.take(role)) {
+        Some(take) => sequence.id == take,
+        None => sequence.role == role || (sequence.role == Role::Whole && split.is_some()),
+    };
+    let frames = |sequence: &SequenceInfo, role: Role| -> Vec<usize> {
+        let by_range = split.filter(|_| sequence.role == Role::Whole);
+        indices(sequence, |frame| by_range.is_none_or(|split| split.selects(role, frame)))
+    };
+    let train = subject.sequences.iter().find(|s| plays(s, Role::Train)).map(|s| (s, frames(s, Role::Train)));
+    let tests: Vec<&SequenceInfo> = subject.sequences.iter().filter(|s| plays(s, Role::Test)).collect();
+    let label = |test: &SequenceInfo| match tests.len() {
+        1 => subject.id.clone(),
+        _ => format!("{} / {}", subject.id, test.id),
+    };
+    let row = |test: &&SequenceInfo| {
+        let scored = frames(test, Role::Test);
+        data_row(dataset, subject, test, label(test), scored, train.clone(), options)
+    };
+    tests.iter().map(row).collect()
+}
+
+/// The rows of a subject that stands in: each of its test sequences.
+fn stand_in_rows(
+    stand_in: &StandIn,
+    dataset: &Dataset,
+    subject: &SubjectInfo,
+    options: &Options,
+) -> Vec<DataRow> {
+    let plays = |sequence: &&SequenceInfo, role: Role, named: &[String]| match named {
+        [] => sequence.role == role,
+        named => named.contains(&sequence.id),
+    };
+    let train = subject.sequences.iter().find(|s| plays(s, Role::Train, &stand_in.train));
+    let train = train.map(|sequence| (sequence, indices(sequence, |_| true)));
+    let tests = subject.sequences.iter().filter(|s| plays(s, Role::Test, &stand_in.test));
+    let row = |test: &SequenceInfo| {
+        let label = format!("{} / {}", subject.id, test.id);
+        data_row(dataset, subject, test, label, indices(test, |_| true), train.clone(), options)
+    };
+    tests.map(row).collect()
+}
+
+/// Indices of the frames for which the condition holds.
+fn indices(sequence: &SequenceInfo, keep: impl Fn(&FrameInfo) -> bool) -> Vec<usize> {
+    let kept = sequence.frames.iter().enumerate().filter(|(_, frame)| keep(frame));
+    kept.map(|(index, _)| index).collect()
+}
+
+fn data_row(
+    dataset: &Dataset,
+    subject: &SubjectInfo,
+    test: &SequenceInfo,
+    label: String,
+    scored: Vec<usize>,
+    train: Option<(&SequenceInfo, Vec<usize>)>,
+    options: &Options,
+) -> DataRow {
+    let frames = options.subset.select(scored, &options.profile);
+    let missing = frames.is_empty().then(|| "no test frame is left by the split and the subset".to_owned());
+    let thin = |frames: Vec<usize>| evenly_spaced(&frames, options.profile.max_train_frames);
+    DataRow {
+        id: format!("{}/{}/{}", dataset.id, subject.id, test.id),
+        label,
+        dataset: dataset.id.clone(),
+        subject: subject.id.clone(),
+        sequence: test.id.clone(),
+        frames,
+        train: train.map(|(sequence, frames)| (sequence.id.clone(), thin(frames))),
+        missing,
+    }
+}

@@ -1,0 +1,276 @@
+//! The experiment file: one table, described as data.
+
+use super::{Capture, EMBEDDED, Error, Paper, Source, Split, validate};
+use crate::metrics::MetricKind;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// One table: what to ask of which data. See `experiments/README.md` for the file format.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// Version of the file format: 1.
+    pub schema: u32,
+    /// Id, equal to the file's name without `.toml`; names the outputs.
+    pub id: String,
+    /// Version of the experiment: raised by hand when a change makes old and new numbers incomparable.
+    pub version: u32,
+    /// Title, such as `Table 1`.
+    pub title: String,
+    /// Caption when the table's own data set runs.
+    pub caption: String,
+    /// Id of the table's own data set.
+    pub dataset: String,
+    /// Its name in prose: a stand-in's caption must not contain it.
+    pub dataset_title: String,
+    /// The stock method that the table is about.
+    pub method: String,
+    /// The scoring protocol: a preset's id, or a preset with other choices, such as `haha+ssim=torchmetrics-1.4`.
+    pub protocol: String,
+    /// Whether the antialiased rasterizer renders.
+    #[serde(default)]
+    pub antialiased: bool,
+    /// Subjects of the data set, in printed order; all of them if empty.
+    #[serde(default)]
+    pub sequences: Vec<String>,
+    /// Shape of the table.
+    pub layout: Layout,
+    /// Id of the variant with which the others are compared frame by frame.
+    pub baseline: String,
+    /// The mean over sequences; none if absent.
+    pub average: Option<Average>,
+    /// Remarks printed under the table.
+    #[serde(default)]
+    pub notes: Vec<String>,
+    /// What may run where the data set is absent; nothing if absent.
+    pub stand_in: Option<StandIn>,
+    /// The metric columns.
+    pub columns: Vec<Column>,
+    /// What is compared.
+    pub variants: Vec<Variant>,
+    /// The printed table, if there is one.
+    pub paper: Option<Paper>,
+    /// How the compared method's repository splits the data.
+    #[serde(default)]
+    pub splits: Vec<Split>,
+}
+
+/// Shape of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// A row per sequence and variant, a column per metric (Tables 1 to 5).
+    Rows,
+    /// A row per variant, a group of metric columns per sequence (Table 6).
+    Wide,
+}
+
+/// The mean over sequences, each counting once however many frames it has.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Average {
+    /// Title of the row or of the column group.
+    pub label: String,
+}
+
+/// Which data may run in place of the table's own.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StandIn {
+    /// The kind of capture that a subject must be.
+    pub capture: Capture,
+    /// Caption of a table made from stand-in data; it must not name the table's own data set.
+    pub caption: String,
+    /// Scoring protocol of the stand-in where the table's own does not fit it; the table's own if absent.
+    #[serde(default)]
+    pub protocol: Option<String>,
+    /// Ids of the sequences from which avatars are made (the first that a subject has is taken); its first training
+    /// sequence if empty.
+    #[serde(default)]
+    pub train: Vec<String>,
+    /// Ids of the sequences that are scored; every test sequence if empty.
+    #[serde(default)]
+    pub test: Vec<String>,
+}
+
+/// A metric column.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Column {
+    /// The metric.
+    pub metric: MetricKind,
+    /// Title; the metric's usual one if absent.
+    #[serde(default)]
+    pub title: Option<String>,
+    /// Digits after the point; the metric's usual number if absent.
+    #[serde(default)]
+    pub decimals: Option<usize>,
+}
+
+impl Column {
+    /// Title of the column.
+    pub fn title(&self) -> &str {
+        self.title.as_deref().unwrap_or(self.metric.title())
+    }
+
+    /// Digits after the point.
+    pub fn decimals(&self) -> usize {
+        self.decimals.unwrap_or(self.metric.decimals())
+    }
+}
+
+/// One of the things that a table compares: an avatar and how it is posed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variant {
+    /// Id, unique in the table.
+    pub id: String,
+    /// Label in the table.
+    pub label: String,
+    /// Id of the printed variant whose numbers belong beside this one's; none if nothing printed compares.
+    #[serde(default)]
+    pub paper: Option<String>,
+    /// Where the avatar comes from.
+    pub avatar: AvatarRecipe,
+    /// How its Gaussians are posed: a strategy's id or spec, such as `quaternion-average+rotation=power-15`. Absent
+    /// for a textured mesh, which has none.
+    #[serde(default)]
+    pub strategy: Option<String>,
+    /// SH degree of the colour, 0 to 3, for avatars that are made here.
+    #[serde(default)]
+    pub sh_degree: Option<u8>,
+}
+
+/// Where an avatar comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "recipe", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum AvatarRecipe {
+    /// One Gaussian per vertex of the body, bound to the vertex's joints, coloured from the training frames.
+    SurfaceVertex {},
+    /// Gaussians on the faces of the body, bound by barycentric coordinates, coloured from the training frames.
+    SurfaceFace {
+        /// Gaussians per face; one sits at the centroid.
+        #[serde(default = "one")]
+        per_face: u32,
+    },
+    /// The body's mesh with a texture gathered from the training frames, drawn by the triangle rasterizer.
+    TexturedMesh {
+        /// Side of the texture, texels.
+        size: u32,
+    },
+    /// A file that the data set registers for the subject.
+    File {
+        /// Name under which it is registered.
+        name: String,
+    },
+}
+
+/// The default of [`AvatarRecipe::SurfaceFace::per_face`].
+fn one() -> u32 {
+    1
+}
+
+impl AvatarRecipe {
+    /// True if a strategy poses it.
+    pub fn is_gaussian(&self) -> bool {
+        !matches!(self, Self::TexturedMesh { .. })
+    }
+
+    /// True if it is made from training frames rather than read from a file.
+    pub fn is_built(&self) -> bool {
+        !matches!(self, Self::File { .. })
+    }
+}
+
+impl Experiment {
+    /// Reads one experiment file.
+    ///
+    /// # Errors
+    /// Names the file and the line or key.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    /// Reads every `*.toml` of a folder, in the order of their names.
+    ///
+    /// # Errors
+    /// Names the file and the line or key; also if two files have one id.
+    pub fn load_folder(folder: &Path) -> Result<Vec<Self>, Error> {
+        let io = |source| Error::Io { path: folder.into(), source };
+        let mut paths = Vec::new();
+        for entry in std::fs::read_dir(folder).map_err(io)? {
+            let path = entry.map_err(io)?.path();
+            if path.extension().is_some_and(|extension| extension == "toml") {
+                paths.push(path);
+            }
+        }
+        paths.sort();
+        let experiments: Vec<Self> = paths.iter().map(|path| Self::load(path)).collect::<Result<_, _>>()?;
+        validate::distinct(&experiments, &folder.display().to_string())?;
+        Ok(experiments)
+    }
+
+    /// The six tables of the paper, compiled in.
+    pub fn embedded() -> Vec<Self> {
+        let parse = |(file, text): &(&str, &str)| Self::parse(text, file).expect("tests load every one");
+        EMBEDDED.iter().map(parse).collect()
+    }
+
+    /// Parses and checks the text of an experiment file; `file` is its name in error messages.
+    ///
+    /// # Errors
+    /// Names the file and the line or key.
+    pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
+        let experiment: Self = toml::from_str(text).map_err(|error| toml_error(text, file, &error))?;
+        validate::experiment(&experiment, file)?;
+        Ok(experiment)
+    }
+
+    /// The variant of this id.
+    pub fn variant(&self, id: &str) -> Option<&Variant> {
+        self.variants.iter().find(|variant| variant.id == id)
+    }
+
+    /// The scoring protocol on data of this source.
+    pub fn protocol_on(&self, source: Source) -> &str {
+        let other = self.stand_in.as_ref().and_then(|stand_in| stand_in.protocol.as_deref());
+        if source == Source::StandIn { other.unwrap_or(&self.protocol) } else { &self.protocol }
+    }
+
+    /// The experiment with a further row for each of the given strategies `(id, title)` that no variant has yet. The
+    /// rows copy the avatar of the last variant that a strategy poses; without such a variant nothing is added.
+    pub fn with_strategies<'a>(&self, strategies: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
+        let mut extended = self.clone();
+        let Some(model) = self.variants.iter().rev().find(|variant| variant.strategy.is_some()) else {
+            return extended;
+        };
+        for (id, title) in strategies {
+            let known = |v: &Variant| {
+                v.strategy.as_deref() == Some(id)
+                    && v.avatar == model.avatar
+                    && v.sh_degree == model.sh_degree
+            };
+            if !extended.variants.iter().any(known) {
+                extended.variants.push(Variant {
+                    id: format!("strategy-{id}"),
+                    label: title.to_owned(),
+                    paper: None,
+                    strategy: Some(id.to_owned()),
+                    ..model.clone()
+                });
+            }
+        }
+        extended
+    }
+}
+
+/// The parser's complaint in one line, with the line that it is about.
+fn toml_error(text: &str, file: &str, error: &toml::de::Error) -> Error {
+    let start = error.span().map_or(0, |span| span.start.min(text.len()));
+    let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count();
+    let excerpt = text.lines().nth(line).unwrap_or_default().trim();
+    let shown: String = excerpt.chars().take(80).collect();
+    let message = error.message().trim().replace('\n', ", ");
+    Error::Toml { file: file.into(), line: line + 1, message, excerpt: shown }
+}

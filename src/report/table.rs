@@ -1,0 +1,241 @@
+//! The table as a value: the one thing that Markdown, CSV, JSON and LaTeX are written from.
+
+use crate::experiment::Source;
+use crate::metrics::MetricKind;
+use serde::{Deserialize, Serialize};
+
+/// A table, ready to be written in any format.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table {
+    /// Id of the experiment; names the files.
+    pub id: String,
+    /// Such as `Table 1`.
+    pub title: String,
+    /// One sentence, without a full stop at the end.
+    pub caption: String,
+    /// What the numbers come from: data, protocol, profile, frames. Sentences without full stops.
+    pub ran_on: Vec<String>,
+    /// Own data, a stand-in, or nothing.
+    pub source: Source,
+    /// Headings of the leading text columns.
+    pub labels: Vec<String>,
+    /// The metric columns.
+    pub columns: Vec<TableColumn>,
+    /// The rows.
+    pub rows: Vec<Row>,
+    /// Footnotes; cells refer to them by index.
+    pub notes: Vec<String>,
+    /// Remarks that belong to the table as a whole.
+    pub remarks: Vec<String>,
+    /// The paper's numbers, where they do not compare with the table's.
+    pub paper: Option<Box<Table>>,
+}
+
+/// A metric column.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableColumn {
+    /// Heading over a group of columns: the sequence, in a wide table.
+    pub group: Option<String>,
+    /// Heading.
+    pub title: String,
+    /// The metric.
+    pub metric: MetricKind,
+    /// Digits after the point.
+    pub decimals: usize,
+}
+
+impl TableColumn {
+    /// The heading with an arrow towards better values.
+    pub fn heading(&self) -> String {
+        format!("{} {}", self.title, if self.metric.higher_is_better() { '↑' } else { '↓' })
+    }
+
+    /// A name that is unique in the table: `psnr`, `lab psnr`.
+    pub fn name(&self) -> String {
+        match &self.group {
+            Some(group) => format!("{group} {}", self.metric.id()),
+            None => self.metric.id().to_owned(),
+        }
+    }
+}
+
+/// What the numbers of a row are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RowKind {
+    /// Measured on a sequence.
+    Measured,
+    /// Mean over the sequences, each counting once.
+    Mean,
+    /// Printed in the paper.
+    Paper,
+    /// Measured minus printed.
+    Difference,
+}
+
+/// A row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    /// What the numbers are.
+    pub kind: RowKind,
+    /// Text cells, one per [`Table::labels`].
+    pub labels: Vec<String>,
+    /// One per [`Table::columns`].
+    pub cells: Vec<Cell>,
+}
+
+/// What a cell holds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "state", content = "value")]
+pub enum Content {
+    /// A finite number.
+    Number(f64),
+    /// Infinity: the PSNR of identical images.
+    Infinite,
+    /// Frames were scored, but not by this metric (LPIPS without weights).
+    NotComputed,
+    /// The quantity does not exist (the splats of a mesh).
+    NotApplicable,
+    /// There should be a number, but no frame was scored.
+    Missing,
+}
+
+impl Content {
+    /// A number, finite or not.
+    pub fn number(value: f64) -> Self {
+        match value {
+            value if value.is_finite() => Self::Number(value),
+            f64::INFINITY => Self::Infinite,
+            _ => Self::Missing,
+        }
+    }
+
+    /// The number, if it is one; +inf for [`Content::Infinite`].
+    pub fn value(self) -> Option<f64> {
+        match self {
+            Self::Number(value) => Some(value),
+            Self::Infinite => Some(f64::INFINITY),
+            Self::NotComputed | Self::NotApplicable | Self::Missing => None,
+        }
+    }
+}
+
+/// A cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// What it holds, in full precision.
+    pub content: Content,
+    /// As printed, before any markup: the rounded number, `∞`, `n/c` (not computed), `—`.
+    pub text: String,
+    /// Whether it is the best of its sequence, judged on the printed digits.
+    pub best: bool,
+    /// Frames behind the number.
+    pub frames: usize,
+    /// Frames that should be behind it and are not.
+    pub missing: usize,
+    /// Footnotes: indices into [`Table::notes`].
+    pub notes: Vec<usize>,
+}
+
+impl Cell {
+    /// A cell that prints its content with this many digits after the point.
+    pub fn new(content: Content, decimals: usize) -> Self {
+        let text = match content {
+            Content::Number(value) => round(value, decimals),
+            Content::Infinite => "∞".to_owned(),
+            Content::NotComputed => "n/c".to_owned(),
+            Content::NotApplicable | Content::Missing => "—".to_owned(),
+        };
+        Self { content, text, best: false, frames: 0, missing: 0, notes: Vec::new() }
+    }
+
+    /// A cell without a number.
+    pub fn empty() -> Self {
+        Self::new(Content::NotApplicable, 0)
+    }
+
+    /// The value of the printed digits.
+    pub fn printed(&self) -> Option<f64> {
+        match self.content {
+            Content::Number(_) => self.text.parse().ok(),
+            content => content.value(),
+        }
+    }
+}
+
+/// The number with this many digits after the point; never `-0.00`.
+fn round(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.'));
+    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
+}
+
+/// Marks the best cells of each column among rows that compare with each other. Equal digits are equally good. Nothing
+/// is marked in a column where a number is missing or rests on fewer frames than planned, or where there is only one
+/// number: there the rows do not compare.
+pub fn mark_best(rows: &mut [&mut Vec<Cell>], columns: &[(MetricKind, usize)]) {
+    for (c, (metric, _)) in columns.iter().enumerate() {
+        let values: Vec<f64> = rows.iter().filter_map(|cells| cells[c].printed()).collect();
+        let comparable = rows.iter().all(|cells| {
+            let cell = &cells[c];
+            cell.missing == 0 && (cell.content.value().is_some() || cell.content == Content::NotApplicable)
+        });
+        if !comparable || values.len() < 2 {
+            continue;
+        }
+        let better = if metric.higher_is_better() { f64::max } else { f64::min };
+        let best = values.into_iter().fold(f64::NAN, better);
+        for cells in rows.iter_mut() {
+            cells[c].best = cells[c].printed() == Some(best);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn number(value: f64, decimals: usize) -> Cell {
+        Cell::new(Content::number(value), decimals)
+    }
+
+    fn bests(metric: MetricKind, cells: Vec<Cell>) -> Vec<bool> {
+        let mut rows: Vec<Vec<Cell>> = cells.into_iter().map(|cell| vec![cell]).collect();
+        mark_best(&mut rows.iter_mut().collect::<Vec<_>>(), &[(metric, 0)]);
+        rows.iter().map(|cells| cells[0].best).collect()
+    }
+
+    #[test]
+    fn digits_decide_and_ties_are_both_best() {
+        assert_eq!(bests(MetricKind::Psnr, vec![number(22.071, 2), number(22.069, 2)]), [true, true]);
+        assert_eq!(bests(MetricKind::Psnr, vec![number(22.07, 2), number(22.08, 2)]), [false, true]);
+        assert_eq!(bests(MetricKind::Lpips, vec![number(0.1, 4), number(0.2, 4)]), [true, false]);
+        assert_eq!(bests(MetricKind::Splats, vec![number(10.0, 0), number(9.0, 0)]), [false, true]);
+        assert_eq!(bests(MetricKind::Psnr, vec![number(f64::INFINITY, 2), number(90.0, 2)]), [true, false]);
+    }
+
+    #[test]
+    fn rows_that_do_not_compare_have_no_best() {
+        let short = Cell { missing: 1, ..number(30.0, 2) };
+        assert_eq!(bests(MetricKind::Psnr, vec![short, number(20.0, 2)]), [false, false]);
+        let none = Cell::new(Content::NotComputed, 4);
+        assert_eq!(bests(MetricKind::Lpips, vec![none.clone(), number(0.1, 4)]), [false, false]);
+        assert_eq!(bests(MetricKind::Lpips, vec![none.clone(), none]), [false, false]);
+        assert_eq!(bests(MetricKind::Splats, vec![Cell::empty(), number(9.0, 0)]), [false, false]);
+        assert_eq!(bests(MetricKind::Splats, vec![Cell::empty(), number(9.0, 0), number(8.0, 0)]), [false, false, true]);
+    }
+
+    #[test]
+    fn numbers_print_with_their_digits() {
+        assert_eq!(number(19.7, 2).text, "19.70");
+        assert_eq!(number(-0.001, 2).text, "0.00");
+        assert_eq!(number(-0.5, 2).text, "-0.50");
+        assert_eq!(number(f64::INFINITY, 2).text, "∞");
+        assert_eq!(Content::number(f64::NAN), Content::Missing);
+        assert_eq!(number(65180.0, 0).text, "65180");
+    }
+}
