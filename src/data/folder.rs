@@ -143,7 +143,7 @@ impl Loader<'_> {
         let body = self.shaped(&model, &track.betas)?;
         let poses = track.poses(&body.skeleton)?;
         let frames = frames_of(folder, &listing, transforms.frames, poses.len(), cameras.len())?;
-        Ok(Sequence { id: id.to_owned(), body, poses, cameras, frames })
+        Ok(Sequence { id: id.to_owned(), body, poses, cameras, frames, stored_sizes: None })
     }
 
     /// The body model that a sequence names, looked for in `models` beside and above the subject.

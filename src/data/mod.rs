@@ -18,6 +18,7 @@
 pub mod atomic;
 pub mod body;
 pub mod camera;
+mod digest;
 pub mod error;
 pub mod folder;
 pub mod frames;
@@ -26,6 +27,7 @@ pub mod npy;
 pub mod npz;
 pub mod ply;
 pub mod poses;
+mod reduce;
 pub mod sequence;
 
 pub use error::Error;

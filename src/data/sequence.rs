@@ -1,8 +1,7 @@
 //! A sequence of posed frames: everything an evaluation needs, with images decoded only when asked for.
 
-use super::{Error, frames};
+use super::{Error, frames, reduce};
 use crate::scene::{Camera, Image, Mask, Pose, RestBody};
-use sha2::{Digest, Sha256};
 use std::fmt::Debug;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,6 +19,8 @@ pub struct Sequence {
     pub cameras: Vec<Camera>,
     /// The frames, in order.
     pub frames: Vec<FrameRef>,
+    /// Sizes of the images as stored, width and height per camera, where [`Sequence::reduced`] made the cameras smaller.
+    pub stored_sizes: Option<Vec<[u32; 2]>>,
 }
 
 /// One image of a sequence.
@@ -73,6 +74,42 @@ pub struct Truth {
 }
 
 impl Sequence {
+    /// The sequence seen by cameras whose longer side is at most `longer_side` pixels; true images are reduced by area
+    /// averages when they are loaded.
+    pub fn reduced(&self, longer_side: u32) -> Self {
+        let stored = |camera: &Camera| [camera.width, camera.height];
+        let stored_sizes =
+            self.stored_sizes.clone().unwrap_or_else(|| self.cameras.iter().map(stored).collect());
+        let reduced = |camera: &Camera| {
+            let side = camera.width.max(camera.height);
+            let shrunk = |size: u32| {
+                (u64::from(size) * u64::from(longer_side)).div_ceil(u64::from(side)).max(1) as u32
+            };
+            if side <= longer_side {
+                camera.clone()
+            } else {
+                camera.resized(shrunk(camera.width), shrunk(camera.height))
+            }
+        };
+        let cameras = self.cameras.iter().map(reduced).collect();
+        Self { cameras, stored_sizes: Some(stored_sizes), ..self.clone() }
+    }
+
+    /// The sequence with only the frames of these indices, in this order.
+    ///
+    /// # Errors
+    /// An index out of range.
+    pub fn selected(&self, frames: &[usize]) -> Result<Self, Error> {
+        let frame = |&i: &usize| {
+            let expected = || format!("a frame below {}", self.frames.len());
+            self.frames
+                .get(i)
+                .cloned()
+                .ok_or_else(|| Error::invalid(&self.id, "frame", i.to_string(), expected()))
+        };
+        Ok(Self { frames: frames.iter().map(frame).collect::<Result<_, _>>()?, ..self.clone() })
+    }
+
     /// The true image of a frame, of the size of its camera.
     ///
     /// # Errors
@@ -82,11 +119,21 @@ impl Sequence {
             let expected = format!("a frame below {}", self.frames.len());
             return Err(Error::invalid(&self.id, "frame", frame.to_string(), expected));
         };
+        let wanted = &self.cameras[*camera];
+        let stored = self.stored_sizes.as_ref().map_or([wanted.width, wanted.height], |sizes| sizes[*camera]);
+        let truth = self.stored_truth(source, stored)?;
+        if stored == [wanted.width, wanted.height] {
+            return Ok(truth);
+        }
+        Ok(reduce::reduced(&truth, wanted.width as usize, wanted.height as usize))
+    }
+
+    /// A true image at the size at which it is stored.
+    fn stored_truth(&self, source: &FrameSource, [width, height]: [u32; 2]) -> Result<Truth, Error> {
         match source {
             FrameSource::Generated { generator, frame } => Ok(generator.truth(*frame)),
             FrameSource::Files { image, mask } => {
-                let camera = &self.cameras[*camera];
-                let size = (camera.width as usize, camera.height as usize);
+                let size = (width as usize, height as usize);
                 let (rgb, own_alpha) = frames::load_image(image)?;
                 check_size(image, "image", (rgb.width(), rgb.height()), size)?;
                 let alpha = match mask {
@@ -100,28 +147,6 @@ impl Sequence {
                 Ok(Truth { rgb, alpha })
             }
         }
-    }
-
-    /// A content key of a frame's truth: SHA-256 of its files, or of the generator's key and the frame number.
-    ///
-    /// # Errors
-    /// If a file cannot be read.
-    pub fn truth_digest(&self, frame: &FrameRef) -> Result<String, Error> {
-        let mut hash = Sha256::new();
-        match &frame.source {
-            FrameSource::Generated { generator, frame } => {
-                hash.update(format!("generated {frame} of {}", generator.key()));
-            }
-            FrameSource::Files { image, mask } => {
-                for (kind, path) in [("image", Some(image)), ("mask", mask.as_ref())] {
-                    let Some(path) = path else { continue };
-                    let bytes = super::error::read_bytes(path, kind, "a frame of the sequence")?;
-                    hash.update(format!("{kind} {} bytes\n", bytes.len()));
-                    hash.update(bytes);
-                }
-            }
-        }
-        Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
     }
 }
 
