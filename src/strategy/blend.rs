@@ -31,7 +31,8 @@ impl Blend {
         if indices.is_empty() {
             return Self::IDENTITY;
         }
-        let mut blend = Self { linear: [[0.0; LANES]; 9], translation: [[0.0; LANES]; 3], weight: [0.0; LANES] };
+        let mut blend =
+            Self { linear: [[0.0; LANES]; 9], translation: [[0.0; LANES]; 3], weight: [0.0; LANES] };
         for (&joint, weight) in indices.iter().zip(weights) {
             let joint = usize::from(joint);
             add(&mut blend.linear, &joints.linear[joint], weight);

@@ -143,6 +143,11 @@ impl BoundAvatar {
         self.means.is_empty()
     }
 
+    /// SH coefficients per Gaussian and channel.
+    pub(crate) fn sh_count(&self) -> usize {
+        (self.sh_degree + 1).pow(2)
+    }
+
     /// The face and the barycentric coordinates of Gaussian `i`; `None` for static avatars and bodies without faces.
     pub fn face(&self, i: usize) -> Option<(u32, [f32; 3])> {
         let seat = self.surface.as_ref()?.seats.get(i)?;

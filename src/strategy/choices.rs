@@ -114,6 +114,9 @@ pub enum ClampChoice {
     Unit,
 }
 
+/// The ids of [`Solver`].
+const SOLVERS: &str = "closed-form, eigen, polar, nlerp, power-N[-START], squaring-N";
+
 impl RotationChoice {
     /// The ids that take no parameter, with their meaning. The ids of [`Solver`] stand for
     /// [`RotationChoice::QuaternionAverage`], and `vertex-average-` may be followed by one.
@@ -161,14 +164,14 @@ impl FromStr for RotationChoice {
         if let Some((_, choice)) = Self::NAMED.iter().find(|(known, _)| *known == id) {
             return Ok(*choice);
         }
-        let unknown = |_| {
+        let unknown = || {
             let named = Self::NAMED.map(|(known, _)| known).join(", ");
-            let expected = format!("a solver ({}), vertex-average-SOLVER, {named}", Solver::KNOWN_IDS);
+            let expected = format!("{SOLVERS}, vertex-average-SOLVER, {named}");
             StrategyError::UnknownId { axis: "rotation", id: id.to_owned(), expected }
         };
         match id.strip_prefix("vertex-average-") {
-            Some(solver) => solver.parse().map(Self::VertexAverage).map_err(unknown),
-            None => id.parse().map(Self::QuaternionAverage).map_err(unknown),
+            Some(solver) => solver.parse().ok().map(Self::VertexAverage).ok_or_else(unknown),
+            None => id.parse().ok().map(Self::QuaternionAverage).ok_or_else(unknown),
         }
     }
 }
@@ -216,19 +219,22 @@ macro_rules! named {
     };
 }
 
-named!(CovarianceChoice, "covariance", [
-    ("rotate", Rotate),
-    ("affine", Affine),
-    ("affine-conjugate", AffineConjugate),
-    ("surfel", Surfel),
-]);
-named!(ColourChoice, "colour", [
-    ("none", None),
-    ("rotate-sh", RotateSh),
-    ("view-blend", ViewBlend),
-    ("view-blend-inverse", ViewBlendInverse),
-    ("view-rotation", ViewRotation),
-]);
+named!(
+    CovarianceChoice,
+    "covariance",
+    [("rotate", Rotate), ("affine", Affine), ("affine-conjugate", AffineConjugate), ("surfel", Surfel),]
+);
+named!(
+    ColourChoice,
+    "colour",
+    [
+        ("none", None),
+        ("rotate-sh", RotateSh),
+        ("view-blend", ViewBlend),
+        ("view-blend-inverse", ViewBlendInverse),
+        ("view-rotation", ViewRotation),
+    ]
+);
 named!(ClampChoice, "clamp", [("non-negative", NonNegative), ("unit", Unit)]);
 
 impl From<ClampChoice> for ColourClamp {

@@ -42,7 +42,8 @@ impl<'a> NearestFace<'a> {
         }
         let order = (0..body.faces.len() as u32).collect();
         let mut tree = Self { vertices: &body.vertices, faces: &body.faces, nodes: Vec::new(), order };
-        let centroids: Vec<DVec3> = (0..body.faces.len() as u32).map(|f| tree.corners(f).iter().sum()).collect();
+        let centroids: Vec<DVec3> =
+            (0..body.faces.len() as u32).map(|f| tree.corners(f).iter().sum()).collect();
         tree.build(&centroids, 0, body.faces.len());
         Some(tree)
     }

@@ -26,8 +26,7 @@ impl RestFaces {
     /// Reads every face of a body.
     pub(crate) fn new(body: &RestBody) -> Self {
         let vertices: Vec<Vec3> = body.vertices.iter().map(|v| v.as_vec3()).collect();
-        let triangles: Vec<[Vec3; 3]> =
-            body.faces.iter().map(|f| f.map(|v| vertices[v as usize])).collect();
+        let triangles: Vec<[Vec3; 3]> = body.faces.iter().map(|f| f.map(|v| vertices[v as usize])).collect();
         let frames = |kind| triangles.iter().map(|&t| face_frame::frame(kind, t)).collect();
         Self {
             corners: body.faces.clone(),

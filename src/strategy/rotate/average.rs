@@ -105,9 +105,8 @@ pub(super) fn of_lane(
     lane: usize,
     solver: Solver,
 ) -> Quaternion<f32> {
-    let bone = |(&joint, weight): (&u16, &Lanes)| {
-        (joints.rotation_f64[usize::from(joint)], f64::from(weight[lane]))
-    };
+    let bone =
+        |(&joint, weight): (&u16, &Lanes)| (joints.rotation_f64[usize::from(joint)], f64::from(weight[lane]));
     let average = with_bones(indices.iter().zip(weights).map(bone), |quats, weights| {
         average_rotation(quats, weights, solver)
     });

@@ -39,11 +39,16 @@ pub(super) fn converted(projection: LbsProjection, input: &BlockInput<'_>) -> Tu
     let mut turn = Turn { relative: splat(rotation::identity()), posed: splat(rotation::identity()) };
     for lane in 0..LANES {
         let canonical = take(input.canonical, lane);
-        let turned = matrix3::multiply(input.blend.matrix(lane), rotation::quaternion_to_matrix_raw(canonical));
+        let turned =
+            matrix3::multiply(input.blend.matrix(lane), rotation::quaternion_to_matrix_raw(canonical));
         let raw = rotation::matrix_to_quaternion_raw(turned);
         let unit = rotation::normalize(raw).unwrap_or(canonical);
         put(&mut turn.relative, lane, rotation::multiply(unit, rotation::conjugate(canonical)));
-        put(&mut turn.posed, lane, if projection == LbsProjection::MatrixToQuaternionRaw { raw } else { unit });
+        put(
+            &mut turn.posed,
+            lane,
+            if projection == LbsProjection::MatrixToQuaternionRaw { raw } else { unit },
+        );
     }
     turn
 }

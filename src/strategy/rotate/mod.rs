@@ -93,7 +93,9 @@ pub(super) fn turn(source: &Source, input: &BlockInput<'_>) -> Turn {
         return Turn { relative: splat(rotation::identity()), posed: *input.canonical };
     }
     let relative = match source {
-        Source::Lbs(projection @ (LbsProjection::MatrixToQuaternionRaw | LbsProjection::MatrixToQuaternion)) => {
+        Source::Lbs(
+            projection @ (LbsProjection::MatrixToQuaternionRaw | LbsProjection::MatrixToQuaternion),
+        ) => {
             return lbs::converted(*projection, input);
         }
         Source::Lbs(projection) => lbs::projected(*projection, input),
