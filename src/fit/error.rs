@@ -1,8 +1,7 @@
 //! What can go wrong when an avatar is made.
 
-use crate::scene::SceneError;
-use crate::strategy::StrategyError;
 use crate::data;
+use crate::scene::SceneError;
 
 /// An avatar could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -17,14 +16,6 @@ pub enum Error {
         sequence: String,
         /// What is wrong.
         source: SceneError,
-    },
-    /// The avatar cannot be posed.
-    #[error("sequence {sequence}: {source}")]
-    Strategy {
-        /// Id of the sequence.
-        sequence: String,
-        /// What is wrong.
-        source: StrategyError,
     },
     /// A setting out of its range, or data that cannot give an avatar.
     #[error("{field}: {problem}; expected {expected}")]

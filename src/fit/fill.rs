@@ -140,7 +140,10 @@ mod tests {
         fill_unknown(&mut values, 1, &known, &neighbours, &positions);
         for (i, value) in values[..10].iter().enumerate() {
             // the linear function is the harmonic one on this strip
-            assert!((value[0] - i as f32).abs() < 1e-4 && (value[1] + i as f32).abs() < 1e-4, "{i}: {value:?}");
+            assert!(
+                (value[0] - i as f32).abs() < 1e-4 && (value[1] + i as f32).abs() < 1e-4,
+                "{i}: {value:?}"
+            );
             assert_eq!(value[2], 1.0);
         }
         assert_eq!(values[11], values[9], "a piece without any known part takes the nearest in space");

@@ -10,6 +10,9 @@ use crate::scene::{Image, PosedBody, SkinWeights};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+/// Observations this far from the consensus of the others, in colour, count a quarter.
+pub(super) const ROBUST_SCALE: f64 = 0.1;
+
 /// Frames that are loaded at a time.
 const BATCH: usize = 8;
 
@@ -200,8 +203,7 @@ impl System {
             for j in 0..=i {
                 let inner: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
                 let value = self.matrix[i * (i + 1) / 2 + j] - inner;
-                lower[i][j] =
-                    if i == j { (value + pull).max(1e-300).sqrt() } else { value / lower[j][j] };
+                lower[i][j] = if i == j { (value + pull).max(1e-300).sqrt() } else { value / lower[j][j] };
             }
         }
         for i in 0..n {

@@ -4,11 +4,11 @@
 //! same thing: where a point of the surface is seen in each frame ([`sighting`]), and which colour explains what was seen
 //! there ([`gather`]).
 
+mod disc;
 mod error;
 mod fill;
 mod gather;
 mod sighting;
-mod solid;
 pub mod surface;
 pub mod texture;
 
