@@ -58,7 +58,7 @@ impl Subject {
     /// # Errors
     /// A folder without sequences, missing files, inconsistent cameras, poses, frames or body.
     pub fn load(folder: &Path, options: &Options) -> Result<Self, Error> {
-        let mut loader = Loader { folder, options, bodies: BTreeMap::new() };
+        let mut loader = Loader { folder, options, models: BTreeMap::new() };
         let mut split = |prefix: &str| -> Result<Vec<Sequence>, Error> {
             let names = sequence_folders(folder, prefix)?;
             names.iter().map(|name| loader.sequence(&folder.join(name), name)).collect()
@@ -129,7 +129,13 @@ struct ListedFrame {
 struct Loader<'a> {
     folder: &'a Path,
     options: &'a Options,
-    bodies: BTreeMap<PathBuf, (Body, Vec<(Vec<f64>, Arc<RestBody>)>)>,
+    models: BTreeMap<PathBuf, Model>,
+}
+
+/// A body model and the shapes of it that sequences share.
+struct Model {
+    body: Body,
+    shapes: Vec<(Vec<f64>, Arc<RestBody>)>,
 }
 
 impl Loader<'_> {
@@ -162,14 +168,15 @@ impl Loader<'_> {
     }
 
     fn shaped(&mut self, model: &Path, betas: &[f64]) -> Result<Arc<RestBody>, Error> {
-        if !self.bodies.contains_key(model) {
-            self.bodies.insert(model.to_owned(), (body::load(model)?, Vec::new()));
+        if !self.models.contains_key(model) {
+            let loaded = Model { body: body::load(model)?, shapes: Vec::new() };
+            self.models.insert(model.to_owned(), loaded);
         }
-        let offsets = self.folder.join("gt_normal_offset.npy");
-        let (body, shapes) = self.bodies.get_mut(model).expect("inserted above");
+        let Model { body, shapes } = self.models.get_mut(model).expect("inserted above");
         if let Some((_, rest)) = shapes.iter().find(|(known, _)| known == betas) {
             return Ok(rest.clone());
         }
+        let offsets = self.folder.join("gt_normal_offset.npy");
         let mut rest = body.shaped(betas).map_err(|e| Error::scene(model, e))?;
         if self.options.clothing && offsets.is_file() {
             let array = npy::read(&offsets)?;

@@ -142,7 +142,7 @@ fn load_npz(path: &Path) -> Result<PoseTrack, Error> {
 fn axis_angles(archive: &mut Archive, name: &str) -> Result<Vec<Vec<DVec3>>, Error> {
     let array = archive.require(name, if name.ends_with("hand_pose") { "T,45" } else { "T,*" })?;
     let width = array.shape[1];
-    if width == 0 || width % 3 != 0 {
+    if width == 0 || !width.is_multiple_of(3) {
         return Err(archive.invalid(name, format!("{width} values per frame"), "axis-angle triples"));
     }
     let frame = |row: &[f64]| row.chunks_exact(3).map(DVec3::from_slice).collect();

@@ -89,7 +89,7 @@ impl Part<'_> {
                 format!("indices below {vertices}"),
             ));
         }
-        if indices.len() % 3 != 0 {
+        if !indices.len().is_multiple_of(3) {
             return Err(SceneError::new(field, format!("{} indices", indices.len()), "three per triangle"));
         }
         Ok(indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect())

@@ -178,7 +178,8 @@ impl<T: Real, S: Real> Bones<'_, T, S> {
     fn eigen(&self, a: [[T; 4]; 4]) -> Quaternion<T> {
         let eigen = SymmetricEigen::new(a);
         if is_distinct(eigen.values[0] - eigen.values[1], eigen.values[0]) {
-            eigen.vectors[0]
+            // The product of some thirty plane rotations has drifted from unit length by a few ulp.
+            rotation::normalize(eigen.vectors[0]).unwrap_or(eigen.vectors[0])
         } else {
             self.tie_break(&eigen)
         }
