@@ -1,0 +1,44 @@
+//! What can go wrong when an avatar is made.
+
+use crate::data;
+use crate::scene::SceneError;
+
+/// An avatar could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A training frame could not be read.
+    #[error(transparent)]
+    Data(#[from] data::Error),
+    /// A camera, pose or body that does not fit.
+    #[error("sequence {sequence}: {source}")]
+    Scene {
+        /// Id of the sequence.
+        sequence: String,
+        /// What is wrong.
+        source: SceneError,
+    },
+    /// A setting out of its range, or data that cannot give an avatar.
+    #[error("{field}: {problem}; expected {expected}")]
+    Invalid {
+        /// The setting, or the part of the sequence.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+        /// What was expected instead.
+        expected: String,
+    },
+}
+
+impl Error {
+    pub(super) fn invalid(
+        field: impl Into<String>,
+        problem: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Invalid { field: field.into(), problem: problem.into(), expected: expected.into() }
+    }
+
+    pub(super) fn scene(sequence: &data::sequence::Sequence) -> impl Fn(SceneError) -> Self + '_ {
+        |source| Self::Scene { sequence: sequence.id.clone(), source }
+    }
+}

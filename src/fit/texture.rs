@@ -1,0 +1,164 @@
+//! A textured mesh as an avatar: the texture is gathered from the training frames, the triangle rasterizer draws it.
+
+use super::Error;
+use super::gather::{Gathering, Parts, ROBUST_SCALE, gather};
+use super::sighting::{Frame, SurfacePoint};
+use super::surface;
+use crate::data::sequence::Sequence;
+use crate::math::sh;
+use crate::render::mesh::{Mesh, SamplePattern, Texture, draw, visible_faces};
+use crate::scene::{Camera, Image, PosedBody, Rendered, RestBody, SceneError, Uv};
+use glam::{DMat4, Vec3};
+use rayon::prelude::*;
+
+/// A texture and where it goes on a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TexturedBody {
+    /// Texture coordinates per face corner.
+    pub uv: Uv,
+    /// The colours.
+    pub texture: Texture,
+}
+
+impl TexturedBody {
+    /// Draws the body in a pose, over a background.
+    ///
+    /// # Errors
+    /// A camera that breaks an invariant, or another body than the one that the texture was made for.
+    pub fn draw(
+        &self,
+        body: &PosedBody<'_>,
+        camera: &Camera,
+        pattern: SamplePattern,
+        background: [f32; 3],
+    ) -> Result<Rendered, SceneError> {
+        let faces = &body.rest.faces;
+        if faces.len() != self.uv.faces.len() {
+            let expected = format!("the textured body's {}", self.uv.faces.len());
+            return Err(SceneError::new("faces", format!("{} of them", faces.len()), expected));
+        }
+        let mesh = Mesh::new(&body.mesh().vertices, faces)?;
+        Ok(draw(&mesh, camera, pattern, self.texture.shader(&self.uv))?.over(background))
+    }
+}
+
+/// The largest side of a texture, texels.
+pub const MAX_SIZE: u32 = 8192;
+
+/// Observations of a texel count against the colour spread from its surroundings, which counts as much as one frontal
+/// observation in so many.
+const PRIOR_WEIGHT: f32 = 0.02;
+
+/// Texels around each chart that repeat its border, so that interpolation never reads an empty texel.
+const GUTTER: usize = 8;
+
+/// Gathers a square texture of `size` texels a side from the frames of a sequence, in the body's own atlas. Each texel is
+/// the robust mean of what the frames show of it; where they show little or nothing, the colour comes from the surface
+/// around it.
+///
+/// # Errors
+/// A size of zero or above [`MAX_SIZE`], a body without texture coordinates, a sequence without frames, a frame that
+/// cannot be read.
+pub fn gather_texture(sequence: &Sequence, size: u32) -> Result<TexturedBody, Error> {
+    if size == 0 || size > MAX_SIZE {
+        return Err(Error::invalid("texture size", size.to_string(), format!("1 to {MAX_SIZE} texels")));
+    }
+    let body = &*sequence.body;
+    let Some(uv) = body.uv.clone() else {
+        let field = format!("sequence {}: body", sequence.id);
+        return Err(Error::invalid(field, "no texture coordinates", "uv per face corner (vt and ft)"));
+    };
+    let coarse = surface::vertex_colours(sequence)?;
+    let atlas = Atlas::new(&uv, size).map_err(Error::scene(sequence))?;
+    let parts = Parts::single_points(atlas.points);
+    let truth = |frame: &Frame<'_>| Ok(frame.truth.rgb.clone());
+    let mean = Gathering { degree: 0, smoothness: 0.0, robust: None };
+    let first = gather(sequence, &parts, mean, 0.5, truth)?;
+    let robust = Gathering { robust: Some((&first, ROBUST_SCALE)), ..mean };
+    let colours = gather(sequence, &parts, robust, 0.5, truth)?;
+
+    let texel = |(part, point): (usize, &SurfacePoint)| -> [f32; 3] {
+        let own = colours.of(part)[0].map(|c| 0.5 + c * sh::C0 as f32);
+        let around = interpolated(body, &coarse, point);
+        let weight = colours.confidence[part];
+        std::array::from_fn(|c| (own[c] * weight + around[c] * PRIOR_WEIGHT) / (weight + PRIOR_WEIGHT))
+    };
+    let texels: Vec<[f32; 3]> = parts.points.par_iter().enumerate().map(texel).collect();
+    let image = with_gutter(&atlas.pixels, &texels, size as usize).map_err(Error::scene(sequence))?;
+    Ok(TexturedBody { uv, texture: Texture::new(image) })
+}
+
+fn interpolated(body: &RestBody, vertex_colours: &[[f32; 3]], point: &SurfacePoint) -> [f32; 3] {
+    let corners = body.faces[point.face as usize].map(|i| vertex_colours[i as usize]);
+    std::array::from_fn(|c| (0..3).map(|k| corners[k][c] * point.barycentric[k]).sum())
+}
+
+/// The texels of an atlas whose centre lies on a face.
+struct Atlas {
+    points: Vec<SurfacePoint>,
+    /// Where each point's texel lies, in row-major order.
+    pixels: Vec<usize>,
+}
+
+impl Atlas {
+    fn new(uv: &Uv, size: u32) -> Result<Self, SceneError> {
+        let side = size as f32;
+        let flat: Vec<Vec3> =
+            uv.coordinates.iter().map(|&[u, v]| Vec3::new(u * side, (1.0 - v) * side, 1.0)).collect();
+        let mesh = Mesh::new(&flat, &uv.faces)?;
+        // pixel coordinates are the x and y of points at z = 1
+        let camera = Camera {
+            width: size,
+            height: size,
+            fx: 1.0,
+            fy: 1.0,
+            cx: 0.0,
+            cy: 0.0,
+            camera_from_world: DMat4::IDENTITY,
+        };
+        let faces = visible_faces(&mesh, &camera)?;
+        let barycentric = draw(&mesh, &camera, SamplePattern::new(1), |f| f.barycentric)?.colour;
+        let side = size as usize;
+        let point = |pixel: &usize| {
+            let (x, y) = (pixel % side, pixel / side);
+            faces.face(x, y).map(|face| SurfacePoint { face, barycentric: barycentric.at(x, y) })
+        };
+        let pixels: Vec<usize> = (0..side * side).filter(|pixel| point(pixel).is_some()).collect();
+        let points = pixels.iter().filter_map(point).collect();
+        Ok(Self { points, pixels })
+    }
+}
+
+/// The texels on an image of `size`, grown outwards by [`GUTTER`] texels; the rest has the mean colour.
+fn with_gutter(pixels: &[usize], texels: &[[f32; 3]], size: usize) -> Result<Image, SceneError> {
+    let mut values: Vec<Option<[f32; 3]>> = vec![None; size * size];
+    for (&pixel, &texel) in pixels.iter().zip(texels) {
+        values[pixel] = Some(texel);
+    }
+    for _ in 0..GUTTER {
+        let grown = |(pixel, own): (usize, &Option<[f32; 3]>)| {
+            own.or_else(|| mean(neighbours(pixel, size).filter_map(|n| values[n])))
+        };
+        values = values.par_iter().enumerate().map(grown).collect();
+    }
+    let rest = mean(texels.iter().copied()).unwrap_or([0.5; 3]);
+    Image::new(size, size, values.into_iter().map(|v| v.unwrap_or(rest)).collect())
+}
+
+fn neighbours(pixel: usize, size: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = ((pixel % size) as isize, (pixel / size) as isize);
+    let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
+    around.filter_map(move |(dx, dy)| {
+        let (x, y, side) = (x + dx, y + dy, size as isize);
+        (x >= 0 && y >= 0 && x < side && y < side).then_some((y * side + x) as usize)
+    })
+}
+
+fn mean(colours: impl Iterator<Item = [f32; 3]>) -> Option<[f32; 3]> {
+    let (mut sum, mut count) = ([0.0f64; 3], 0u32);
+    for colour in colours {
+        sum = std::array::from_fn(|c| sum[c] + f64::from(colour[c]));
+        count += 1;
+    }
+    (count > 0).then(|| sum.map(|s| (s / f64::from(count)) as f32))
+}
