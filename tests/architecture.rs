@@ -86,7 +86,9 @@ fn no_module_imports_upwards() {
     let layer = |name: &str| LAYERS.iter().find(|(module, ..)| *module == name);
     let mut edges = 0;
     for (file, text) in all_sources() {
-        let Some(module) = file.strip_prefix("src/").and_then(|f| f.split(['/', '.']).next()) else { continue };
+        let Some(module) = file.strip_prefix("src/").and_then(|f| f.split(['/', '.']).next()) else {
+            continue;
+        };
         let Some((_, own, friends)) = layer(module) else {
             assert!(["lib", "main"].contains(&module), "{file}: not in the table of layers");
             continue;
@@ -107,7 +109,10 @@ fn crates_stay_where_they_belong() {
         let code = code(&text);
         for (krate, homes) in HOMES {
             let own = code.contains(&format!(" {krate}")) || code.contains(&format!("({krate}"));
-            assert!(!own || homes.iter().any(|h| file.starts_with(h)), "{file} uses {krate} outside {homes:?}");
+            assert!(
+                !own || homes.iter().any(|h| file.starts_with(h)),
+                "{file} uses {krate} outside {homes:?}"
+            );
         }
     }
 }

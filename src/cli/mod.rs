@@ -1,8 +1,6 @@
-//! The command line: one file per subcommand, progress, exit codes.
-
+//! CLI placeholder while merging
 use std::process::ExitCode;
-
-/// Parses the command line and runs the subcommand.
+/// Main.
 pub fn main() -> ExitCode {
     ExitCode::SUCCESS
 }

@@ -1,3 +1,15 @@
 //! Executing a plan and keeping what comes out.
+//!
+//! [`Library`] holds the data at hand, [`avatars`] makes what is to be posed, [`execute()`] walks the frames, [`store`]
+//! remembers every record by its content key.
 
+pub mod avatars;
+mod error;
+mod execute;
+mod library;
+pub mod provenance;
 pub mod store;
+
+pub use error::Error;
+pub use execute::{Event, execute};
+pub use library::{Library, LoadedDataset};

@@ -1,0 +1,103 @@
+//! An avatar, a body, a frame of a pose track and a strategy: the arguments of `render` and `skin`.
+
+use crate::data::{body, ply, poses};
+use crate::scene::{Avatar, Binding, Pose, Posed, PosedBody, RestBody};
+use crate::strategy::{self, BoundAvatar, Strategy};
+use anyhow::{Context as _, Result, bail};
+use std::path::{Path, PathBuf};
+
+/// Which pose to take, and how to rotate the Gaussians.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Posing")]
+pub(super) struct Posing {
+    /// Body model: SMPL-style .npz, or skinned .glb or .gltf
+    #[arg(long, value_name = "BODY")]
+    body: Option<PathBuf>,
+    /// Poses: .npz, transforms.json, or a .glb or .gltf with clips
+    #[arg(long, value_name = "POSES", requires = "body")]
+    poses: Option<PathBuf>,
+    /// Clip of a glTF file with several
+    #[arg(long, value_name = "NAME", requires = "poses")]
+    clip: Option<String>,
+    /// Pose of the track, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    frame: usize,
+    /// Rotation strategy: a preset, or a preset with changed axes (see `reproduce list strategies`)
+    #[arg(long, value_name = "S", default_value = "quaternion-average")]
+    strategy: Strategy,
+}
+
+/// An avatar that is ready to be posed.
+pub(super) struct Subject {
+    avatar: Avatar,
+    rest: Option<(RestBody, Pose)>,
+}
+
+impl Posing {
+    /// The strategy in its written form.
+    pub(super) fn strategy(&self) -> &Strategy {
+        &self.strategy
+    }
+
+    /// True if a body was named.
+    pub(super) fn has_body(&self) -> bool {
+        self.body.is_some()
+    }
+
+    /// Loads the avatar and, if a body was named, the body in its shape and the pose of the frame.
+    pub(super) fn load(&self, avatar: &Path) -> Result<Subject> {
+        let mut loaded = ply::read_avatar(avatar)?;
+        let Some(body_path) = &self.body else {
+            if !matches!(loaded.binding, Binding::Static) {
+                loaded.binding = Binding::Static;
+            }
+            return Ok(Subject { avatar: loaded, rest: None });
+        };
+        if matches!(loaded.binding, Binding::Static) {
+            let expected = "joint and weight properties, or face, barycentric and offset properties";
+            bail!("{}: no binding; expected {expected}, to pose it with --body", avatar.display());
+        }
+        let model = body::load(body_path)?;
+        let (rest, pose) = match &self.poses {
+            None => {
+                let rest = model.shaped(&[])?;
+                let pose = Pose::rest(&rest.skeleton);
+                (rest, pose)
+            }
+            Some(path) => self.pose_of_frame(path, &model)?,
+        };
+        loaded.validate(Some(&rest)).with_context(|| {
+            format!("{}: does not fit the body {}", avatar.display(), body_path.display())
+        })?;
+        Ok(Subject { avatar: loaded, rest: Some((rest, pose)) })
+    }
+
+    fn pose_of_frame(&self, path: &Path, model: &crate::scene::Body) -> Result<(RestBody, Pose)> {
+        let track = poses::load_clip(path, self.clip.as_deref())?;
+        let rest = model.shaped(&track.betas).with_context(|| format!("{}", path.display()))?;
+        let mut poses = track.poses(&rest.skeleton)?;
+        if self.frame >= poses.len() {
+            bail!("{}: --frame {}; expected a frame below {}", path.display(), self.frame, poses.len());
+        }
+        Ok((rest, poses.swap_remove(self.frame)))
+    }
+}
+
+impl Subject {
+    /// The canonical avatar.
+    pub(super) fn avatar(&self) -> &Avatar {
+        &self.avatar
+    }
+
+    /// Poses the avatar and hands the Gaussians to `use_posed`; without a body they stay where they are.
+    pub(super) fn posed<T>(&self, strategy: &Strategy, use_posed: impl FnOnce(&Posed) -> Result<T>) -> Result<T> {
+        match &self.rest {
+            None => use_posed(&Posed::from_static(&self.avatar.gaussians)),
+            Some((rest, pose)) => {
+                let bound = BoundAvatar::new(&self.avatar, rest)?;
+                let body = PosedBody::new(rest, pose)?;
+                use_posed(&strategy::pose(&bound, &body, strategy)?)
+            }
+        }
+    }
+}

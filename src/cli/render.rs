@@ -1,0 +1,61 @@
+//! `reproduce render`: an avatar, posed or as it stands, through a camera.
+
+use super::{Context, Exit, posing::Posing, selection::parse_colour};
+use crate::data::{camera, frames};
+use crate::render::splat::{self, RenderSettings};
+use anyhow::{Result, bail};
+use std::path::PathBuf;
+
+/// Render a 3DGS PLY, posed or as it stands.
+///
+/// Semantics are those of the original 3DGS rasterizer. CAMERA.json holds width, height, fx, fy, cx, cy,
+/// world_to_camera (4x4, rows, OpenCV axes) and, if you like, background; cameras.npz is read as well.
+#[derive(Debug, clap::Args)]
+pub(super) struct Render {
+    /// The avatar or scene
+    #[arg(value_name = "FILE.ply")]
+    file: PathBuf,
+    /// Camera: .json or .npz
+    #[arg(long, value_name = "CAMERA")]
+    camera: PathBuf,
+    /// Which camera of a file with several, counted from 0
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    camera_index: usize,
+    /// Image to write: .png (8 bit, RGB) or .npy (f32, height x width x 3, not clamped)
+    #[arg(long, value_name = "IMAGE")]
+    out: PathBuf,
+    /// Background colour, sRGB values in [0, 1] [default: the camera file's, else black]
+    #[arg(long, value_name = "R,G,B", value_parser = parse_colour)]
+    background: Option<[f32; 3]>,
+    /// Compensate the opacity of splats that the 0.3-pixel low-pass widens, as the later 3DGS kernels can
+    #[arg(long)]
+    antialiased: bool,
+    #[command(flatten)]
+    posing: Posing,
+}
+
+impl Render {
+    pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        let views = camera::load_views(&self.camera)?;
+        let Some(view) = views.get(self.camera_index) else {
+            let path = self.camera.display();
+            bail!("{path}: --camera-index {}; expected an index below {}", self.camera_index, views.len());
+        };
+        let extension = self.out.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+        if !["png", "npy"].contains(&extension.as_str()) {
+            bail!("{}: --out; expected a name that ends in .png or .npy", self.out.display());
+        }
+        let background = self.background.or(view.background).unwrap_or([0.0; 3]);
+        let settings = RenderSettings { background, antialiased: self.antialiased, ..RenderSettings::default() };
+        let subject = self.posing.load(&self.file)?;
+        let rendered = subject
+            .posed(self.posing.strategy(), |posed| Ok(splat::render(posed, &view.camera, &settings)))?;
+        match extension.as_str() {
+            "png" => frames::save_png(&self.out, &rendered.image)?,
+            _ => frames::save_npy(&self.out, &rendered.image)?,
+        }
+        let (n, out) = (subject.avatar().gaussians.len(), self.out.display());
+        context.note(format!("{out}: {n} Gaussians, {}x{}", view.camera.width, view.camera.height));
+        Ok(Exit::Success)
+    }
+}

@@ -1,0 +1,33 @@
+//! Arguments that several subcommands read in the same way.
+
+use anyhow::{Context as _, Result};
+use serde::de::DeserializeOwned;
+use std::path::Path;
+
+/// Reads a JSON file into a type; the error names the file and the place in it.
+pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot read", path.display()))?;
+    serde_json::from_str(&text).with_context(|| format!("{}: not the JSON that was expected", path.display()))
+}
+
+/// Three comma-separated numbers.
+pub(super) fn parse_colour(text: &str) -> Result<[f32; 3], String> {
+    let parts: Vec<f32> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    match parts[..] {
+        [r, g, b] if parts.iter().all(|v| v.is_finite()) && text.split(',').count() == 3 => Ok([r, g, b]),
+        _ => Err(format!("`{text}` is not R,G,B: three finite numbers, sRGB values in [0, 1]")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_need_three_finite_numbers() {
+        assert_eq!(parse_colour("1, 0.5,0"), Ok([1.0, 0.5, 0.0]));
+        for bad in ["", "1,1", "1,1,1,1", "1,x,1", "nan,0,0", "1,,1"] {
+            assert!(parse_colour(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! What can stop a run.
+
+use super::store;
+use crate::{data, fit, metrics, scene, strategy};
+use std::path::PathBuf;
+
+/// A run, or one of its frames, that cannot go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Data that cannot be read.
+    #[error(transparent)]
+    Data(#[from] data::Error),
+    /// An avatar that cannot be made.
+    #[error(transparent)]
+    Fit(#[from] fit::Error),
+    /// An avatar that cannot be posed.
+    #[error(transparent)]
+    Strategy(#[from] strategy::StrategyError),
+    /// A pose or an image that breaks an invariant.
+    #[error(transparent)]
+    Scene(#[from] scene::SceneError),
+    /// An image that cannot be scored.
+    #[error(transparent)]
+    Metrics(#[from] metrics::MetricsError),
+    /// The results store.
+    #[error(transparent)]
+    Store(#[from] store::Error),
+    /// A folder that cannot be made.
+    #[error("{}: cannot make the folder: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Data that the plan names and the library does not have.
+    #[error("{name}: not among the data at hand; expected the data that the plan was made from")]
+    Absent {
+        /// Its name.
+        name: String,
+    },
+    /// A protocol with a captured background, for data that has none.
+    #[error(
+        "protocol {protocol}: background `captured`; expected a colour, since the data has no captured background"
+    )]
+    NoBackground {
+        /// Its id.
+        protocol: String,
+    },
+}
