@@ -1,1 +1,2 @@
 //! (layer in construction)
+pub mod splat;
