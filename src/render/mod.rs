@@ -1,3 +1,4 @@
-//! From a posed scene to an image: the triangle rasterizer.
+//! From geometry and a camera to an image: [`splat`] draws Gaussians, [`mesh`] draws triangles.
 
 pub mod mesh;
+pub mod splat;
