@@ -1,0 +1,48 @@
+//! The faces of the rest mesh as face strategies need them.
+
+use super::FaceFrame;
+use super::face_frame::{self, Frame};
+use crate::scene::RestBody;
+use glam::Vec3;
+
+/// Rest frames, areas and sizes, one per face of a body.
+#[derive(Clone, Debug)]
+pub(crate) struct RestFaces {
+    /// Vertex indices.
+    pub(crate) corners: Vec<[u32; 3]>,
+    /// The frame along v0→v1 (SplattingAvatar's; iHuman's differs from it by a constant); `None` without area.
+    pub(crate) edge01: Vec<Option<Frame>>,
+    /// The frame along v1→v2 (HAHA's).
+    pub(crate) edge12: Vec<Option<Frame>>,
+    /// Square metres.
+    pub(crate) areas: Vec<f32>,
+    /// Metres; what the means of [`FaceFrame::HahaScaled`] are measured from.
+    pub(crate) centroids: Vec<Vec3>,
+    /// HAHA's k.
+    pub(crate) sizes: Vec<f32>,
+}
+
+impl RestFaces {
+    /// Reads every face of a body.
+    pub(crate) fn new(body: &RestBody) -> Self {
+        let vertices: Vec<Vec3> = body.vertices.iter().map(|v| v.as_vec3()).collect();
+        let triangles: Vec<[Vec3; 3]> = body.faces.iter().map(|f| f.map(|v| vertices[v as usize])).collect();
+        let frames = |kind| triangles.iter().map(|&t| face_frame::frame(kind, t)).collect();
+        Self {
+            corners: body.faces.clone(),
+            edge01: frames(FaceFrame::SplattingAvatar),
+            edge12: frames(FaceFrame::Haha),
+            areas: triangles.iter().map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).collect(),
+            centroids: triangles.iter().map(face_frame::centroid).collect(),
+            sizes: triangles.iter().map(face_frame::haha_size).collect(),
+        }
+    }
+
+    /// The rest frames that a kind of frame turns away from.
+    pub(crate) fn frames(&self, kind: FaceFrame) -> &[Option<Frame>] {
+        match kind {
+            FaceFrame::SplattingAvatar | FaceFrame::IHuman => &self.edge01,
+            FaceFrame::Haha | FaceFrame::HahaScaled => &self.edge12,
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Eq. 7 on a block: the average of the joints' rotations with the skinning weights.
+//!
+//! One joint is its own average; two have a closed form that reads nothing but their inner product, which the block
+//! shares; three or more come from the blend that moves the means. A lane too close to a tie for `f32` is decided in
+//! `f64` by [`average_rotation`]. Other solvers run one Gaussian at a time, in `f64`.
+
+use super::super::blend::{self, Blend};
+use super::super::joints::Joints;
+use super::super::layout::{LANES, Lanes};
+use crate::math::average::{Solver, average_rotation, lanes};
+use crate::math::{Quaternion, rotation};
+
+/// Below this gap of the eigenvalues (over their sum) two joints are decided in `f64`.
+const PAIR_GAP: f32 = 1e-4;
+
+/// The average of each lane as a unit quaternion of either sign.
+#[inline(always)]
+pub(super) fn average(
+    joints: &Joints,
+    indices: &[u16],
+    weights: &[Lanes],
+    blend: &Blend,
+    solver: Solver,
+) -> [Lanes; 4] {
+    match (indices, solver) {
+        ([], _) => splat(rotation::identity()),
+        (&[joint], _) => splat(joints.rotation[usize::from(joint)]),
+        (&[a, b], Solver::ClosedForm) => {
+            let (mut average, settled) = pair(joints, [a, b], [&weights[0], &weights[1]]);
+            settle(joints, indices, weights, &settled, &mut average);
+            average
+        }
+        (_, Solver::ClosedForm) => {
+            let lanes::Lanes { mut quats, settled } = match &joints.rotation_matrix {
+                None => lanes::from_blends(&blend.linear, &blend.weight),
+                Some(matrices) => {
+                    lanes::from_blends(&blend::rotations(matrices, indices, weights), &blend.weight)
+                }
+            };
+            settle(joints, indices, weights, &settled, &mut quats);
+            quats
+        }
+        _ => {
+            let mut average = splat(rotation::identity());
+            for lane in 0..LANES {
+                put(&mut average, lane, of_lane(joints, indices, weights, lane, solver));
+            }
+            average
+        }
+    }
+}
+
+/// Two joints p, q with weights u, v, as [`crate::math::average::two_bones`]: `(ρ + c)(p + q) + κ (1 + c)(p − q)` with
+/// c = |p·q|, κ = (u − v)/(u + v), ρ = √(c² + κ²(1 − c²)) the gap. c is computed in `f64`, nothing after it cancels.
+#[inline(always)]
+fn pair(joints: &Joints, [a, b]: [u16; 2], [u, v]: [&Lanes; 2]) -> ([Lanes; 4], [bool; LANES]) {
+    let [a, b] = [usize::from(a), usize::from(b)];
+    let cosine: f64 = joints.rotation_f64[a].iter().zip(&joints.rotation_f64[b]).map(|(x, y)| x * y).sum();
+    let c = cosine.abs().min(1.0);
+    let sine2 = ((1.0 - c) * (1.0 + c)) as f32;
+    let (c, sign) = (c as f32, 1.0f32.copysign(cosine as f32));
+    let (p, q) = (joints.rotation[a], joints.rotation[b].map(|x| x * sign));
+    let (mut average, mut settled) = ([[0.0; LANES]; 4], [false; LANES]);
+    for lane in 0..LANES {
+        let kappa = (u[lane] - v[lane]) / (u[lane] + v[lane]);
+        let gap = (c * c + kappa * kappa * sine2).sqrt();
+        let (even, odd) = (gap + c, kappa * (1.0 + c));
+        let (of_p, of_q) = (even + odd, even - odd);
+        let [w, x, y, z] = [0, 1, 2, 3].map(|k: usize| of_p * p[k] + of_q * q[k]);
+        let inverse = 1.0 / ((w * w + x * x) + (y * y + z * z)).sqrt();
+        settled[lane] = gap > PAIR_GAP;
+        average[0][lane] = w * inverse;
+        average[1][lane] = x * inverse;
+        average[2][lane] = y * inverse;
+        average[3][lane] = z * inverse;
+    }
+    (average, settled)
+}
+
+/// Decides the lanes that are not settled in `f64`.
+#[inline(always)]
+fn settle(
+    joints: &Joints,
+    indices: &[u16],
+    weights: &[Lanes],
+    settled: &[bool; LANES],
+    average: &mut [Lanes; 4],
+) {
+    if settled.iter().all(|&s| s) {
+        return;
+    }
+    for lane in 0..LANES {
+        if !settled[lane] {
+            put(average, lane, of_lane(joints, indices, weights, lane, Solver::ClosedForm));
+        }
+    }
+}
+
+/// The average of one lane, computed in `f64`.
+#[inline(never)]
+pub(super) fn of_lane(
+    joints: &Joints,
+    indices: &[u16],
+    weights: &[Lanes],
+    lane: usize,
+    solver: Solver,
+) -> Quaternion<f32> {
+    let bone =
+        |(&joint, weight): (&u16, &Lanes)| (joints.rotation_f64[usize::from(joint)], f64::from(weight[lane]));
+    let average = with_bones(indices.iter().zip(weights).map(bone), |quats, weights| {
+        average_rotation(quats, weights, solver)
+    });
+    average.unwrap_or_else(rotation::identity).map(|c| c as f32)
+}
+
+/// Calls `f` with quaternions and weights as slices, on the stack for any usual number of joints.
+pub(super) fn with_bones<R>(
+    bones: impl ExactSizeIterator<Item = (Quaternion<f64>, f64)>,
+    f: impl FnOnce(&[Quaternion<f64>], &[f64]) -> R,
+) -> R {
+    const STACK: usize = 16;
+    let n = bones.len();
+    if n > STACK {
+        let (quats, weights): (Vec<_>, Vec<_>) = bones.unzip();
+        return f(&quats, &weights);
+    }
+    let (mut quats, mut weights) = ([[0.0; 4]; STACK], [0.0; STACK]);
+    for (k, (quat, weight)) in bones.enumerate() {
+        (quats[k], weights[k]) = (quat, weight);
+    }
+    f(&quats[..n], &weights[..n])
+}
+
+/// The same quaternion in every lane.
+#[inline(always)]
+pub(super) fn splat(q: Quaternion<f32>) -> [Lanes; 4] {
+    q.map(|c| [c; LANES])
+}
+
+/// Sets one lane.
+#[inline(always)]
+pub(super) fn put(quats: &mut [Lanes; 4], lane: usize, q: Quaternion<f32>) {
+    for k in 0..4 {
+        quats[k][lane] = q[k];
+    }
+}

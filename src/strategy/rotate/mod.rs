@@ -1,0 +1,135 @@
+//! The rotation axis: one function per choice, a block at a time.
+
+mod average;
+mod dual;
+mod faces;
+mod lbs;
+
+pub(super) use faces::{FaceTurns, VertexTurns};
+
+use super::blend::Blend;
+use super::joints::Joints;
+use super::layout::{Block, Chunk, LANES, Lanes};
+use super::{LbsProjection, RotationChoice};
+use crate::math::average::Solver;
+use crate::math::{Quaternion, rotation};
+use average::{put, splat};
+
+/// How the Gaussians of a block turn.
+pub(super) struct Turn {
+    /// R relative to the rest pose, as unit quaternions.
+    pub(super) relative: [Lanes; 4],
+    /// The quaternions that are drawn: R ⊗ R_c, of unit length except for [`LbsProjection::MatrixToQuaternionRaw`].
+    pub(super) posed: [Lanes; 4],
+}
+
+/// What the rotation of a pose is read from, besides the blend.
+pub(super) enum Source {
+    /// The blended matrix.
+    Lbs(LbsProjection),
+    /// The joints' rotations.
+    Average(Solver),
+    /// The joints' rigid motions.
+    Dual,
+    /// One rotation per face.
+    Faces(FaceTurns),
+    /// One rotation per vertex, combined over a face.
+    Vertices(VertexTurns),
+}
+
+impl Source {
+    /// Everything that is computed once per pose. `None` where the choice reads faces and the avatar knows none.
+    pub(super) fn new(
+        choice: RotationChoice,
+        joints: &Joints,
+        body: &crate::scene::PosedBody<'_>,
+        surface: Option<&super::bound::Surface>,
+    ) -> Option<Self> {
+        Some(match choice {
+            RotationChoice::Lbs(projection) => Self::Lbs(projection),
+            RotationChoice::QuaternionAverage(solver) => Self::Average(solver),
+            RotationChoice::DualQuaternion => Self::Dual,
+            RotationChoice::FaceFrame(kind) => Self::Faces(FaceTurns::new(kind, body, surface?)),
+            RotationChoice::VertexAverage(solver) => {
+                Self::Vertices(VertexTurns::averaged(solver, joints, body, surface?))
+            }
+            RotationChoice::VertexQuaternions(policy) => {
+                Self::Vertices(VertexTurns::summed(policy, body, surface?))
+            }
+        })
+    }
+}
+
+/// What a block is turned with.
+pub(super) struct BlockInput<'a> {
+    pub(super) joints: &'a Joints,
+    pub(super) chunk: &'a Chunk,
+    pub(super) block: &'a Block,
+    /// Index of the chunk's first Gaussian.
+    pub(super) start: usize,
+    pub(super) blend: &'a Blend,
+    /// R_c as unit quaternions.
+    pub(super) canonical: &'a [Lanes; 4],
+}
+
+impl BlockInput<'_> {
+    /// The quaternion average of one lane: what degenerate cases fall back on.
+    fn average_of(&self, lane: usize) -> Quaternion<f32> {
+        let (indices, weights) = self.chunk.influences(self.block);
+        average::of_lane(self.joints, indices, weights, lane, Solver::ClosedForm)
+    }
+
+    /// Index of a lane's Gaussian.
+    fn gaussian(&self, lane: usize) -> usize {
+        self.start + usize::from(self.block.index[lane])
+    }
+}
+
+/// Turns a block.
+#[inline(always)]
+pub(super) fn turn(source: &Source, input: &BlockInput<'_>) -> Turn {
+    let (indices, weights) = input.chunk.influences(input.block);
+    if indices.is_empty() {
+        return Turn { relative: splat(rotation::identity()), posed: *input.canonical };
+    }
+    let relative = match source {
+        Source::Lbs(
+            projection @ (LbsProjection::MatrixToQuaternionRaw | LbsProjection::MatrixToQuaternion),
+        ) => {
+            return lbs::converted(*projection, input);
+        }
+        Source::Lbs(projection) => lbs::projected(*projection, input),
+        Source::Average(solver) => average::average(input.joints, indices, weights, input.blend, *solver),
+        Source::Dual => dual::blend(input.joints, indices, weights).real,
+        Source::Faces(turns) => turns.of_block(input),
+        Source::Vertices(turns) => turns.of_block(input),
+    };
+    let posed = multiply(&relative, input.canonical);
+    Turn { relative, posed }
+}
+
+/// Moves the means of a block by dual-quaternion blending.
+#[inline(always)]
+pub(super) fn dual_means(input: &BlockInput<'_>) -> [Lanes; 3] {
+    let (indices, weights) = input.chunk.influences(input.block);
+    if indices.is_empty() {
+        return input.block.means;
+    }
+    dual::blend(input.joints, indices, weights).transform(&input.block.means)
+}
+
+/// a ⊗ b per lane.
+#[inline(always)]
+fn multiply(a: &[Lanes; 4], b: &[Lanes; 4]) -> [Lanes; 4] {
+    let mut product = [[0.0; LANES]; 4];
+    for lane in 0..LANES {
+        put(&mut product, lane, rotation::multiply(take(a, lane), take(b, lane)));
+    }
+    product
+}
+
+/// One lane.
+#[inline(always)]
+pub(super) fn take(quats: &[Lanes; 4], lane: usize) -> Quaternion<f32> {
+    [quats[0][lane], quats[1][lane], quats[2][lane], quats[3][lane]]
+}

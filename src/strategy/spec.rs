@@ -1,0 +1,137 @@
+//! Strategies as text: `PRESET` or `PRESET+axis=choice+axis=choice`, for instance
+//! `quaternion-average+rotation=power-15+colour=none`.
+
+use super::{PRESETS, Preset, Strategy, StrategyError};
+use std::fmt;
+use std::str::FromStr;
+
+const AXES: [&str; 4] = ["rotation", "covariance", "colour", "clamp"];
+
+impl FromStr for Strategy {
+    type Err = StrategyError;
+
+    fn from_str(spec: &str) -> Result<Self, StrategyError> {
+        let mut parts = spec.split('+');
+        let id = parts.next().unwrap_or_default();
+        let mut strategy = Self::preset(id).ok_or_else(|| StrategyError::UnknownId {
+            axis: "strategy",
+            id: id.to_owned(),
+            expected: PRESETS.iter().map(|preset| preset.id).collect::<Vec<_>>().join(", "),
+        })?;
+        let mut seen = Vec::new();
+        for part in parts {
+            let bad = |expected: String| StrategyError::BadVariation { part: part.to_owned(), expected };
+            let (axis, id) = part.split_once('=').ok_or_else(|| bad("axis=choice".into()))?;
+            if seen.contains(&axis) {
+                return Err(bad(format!("{axis} once")));
+            }
+            match axis {
+                "rotation" => strategy.rotation = id.parse()?,
+                "covariance" => strategy.covariance = id.parse()?,
+                "colour" => strategy.colour = id.parse()?,
+                "clamp" => strategy.clamp = id.parse()?,
+                _ => return Err(bad(format!("one of the axes {}", AXES.join(", ")))),
+            }
+            seen.push(axis);
+        }
+        Ok(strategy)
+    }
+}
+
+/// The axes as text, in the order of [`AXES`].
+fn ids(strategy: &Strategy) -> [String; 4] {
+    let Strategy { rotation, covariance, colour, clamp } = strategy;
+    [rotation.to_string(), covariance.to_string(), colour.to_string(), clamp.to_string()]
+}
+
+/// The preset to describe a strategy by: one with the same kind of rotation if there is one, then the one that differs
+/// on the fewest axes, then the first.
+fn nearest_preset(strategy: &Strategy) -> &'static Preset {
+    let distance = |preset: &&Preset| {
+        let kind = |s: &Strategy| std::mem::discriminant(&s.rotation);
+        let differing = ids(&preset.strategy).iter().zip(ids(strategy)).filter(|(a, b)| *a != b).count();
+        (kind(&preset.strategy) != kind(strategy), differing)
+    };
+    PRESETS.iter().min_by_key(distance).expect("there are presets")
+}
+
+impl fmt::Display for Strategy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let preset = nearest_preset(self);
+        f.write_str(preset.id)?;
+        for ((axis, base), own) in AXES.iter().zip(ids(&preset.strategy)).zip(ids(self)) {
+            if base != own {
+                write!(f, "+{axis}={own}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ClampChoice, ColourChoice, CovarianceChoice, RotationChoice};
+    use super::*;
+
+    #[test]
+    fn presets_print_as_their_id() {
+        for preset in PRESETS {
+            assert_eq!(preset.strategy.to_string(), preset.id);
+            assert_eq!(preset.id.parse::<Strategy>().unwrap(), preset.strategy);
+        }
+    }
+
+    #[test]
+    fn every_combination_round_trips() {
+        let solvers = ["closed-form", "eigen", "polar", "power-15", "power-3", "nlerp"];
+        let mut rotations: Vec<RotationChoice> = RotationChoice::NAMED.iter().map(|(_, r)| *r).collect();
+        for solver in solvers {
+            rotations.push(solver.parse().unwrap());
+            rotations.push(format!("vertex-average-{solver}").parse().unwrap());
+        }
+        for rotation in rotations {
+            for (_, covariance) in CovarianceChoice::NAMED {
+                for (_, colour) in ColourChoice::NAMED {
+                    for (_, clamp) in ClampChoice::NAMED {
+                        let strategy = Strategy { rotation, covariance, colour, clamp };
+                        assert_eq!(strategy.to_string().parse::<Strategy>().unwrap(), strategy, "{strategy}");
+                        let json = serde_json::to_string(&strategy).unwrap();
+                        assert_eq!(serde_json::from_str::<Strategy>(&json).unwrap(), strategy, "{json}");
+                    }
+                }
+            }
+        }
+        let spec = "quaternion-average+rotation=power-15+colour=none";
+        assert_eq!(spec.parse::<Strategy>().unwrap().to_string(), spec);
+    }
+
+    #[test]
+    fn serde_names_are_the_ids() {
+        for (id, choice) in CovarianceChoice::NAMED {
+            assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{id}\""));
+        }
+        for (id, choice) in ColourChoice::NAMED {
+            assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{id}\""));
+        }
+        for (id, choice) in ClampChoice::NAMED {
+            assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{id}\""));
+        }
+    }
+
+    #[test]
+    fn errors_say_what_is_known() {
+        for (spec, part, known) in [
+            ("lbz", "\"lbz\"", "dual-quaternion"),
+            ("", "\"\"", "lbs"),
+            ("lbs+rotation=spin", "\"spin\"", "gram-schmidt-rows"),
+            ("lbs+rotation=spin", "\"spin\"", "closed-form"),
+            ("lbs+colour=red", "\"red\"", "rotate-sh"),
+            ("lbs+covariance", "\"covariance\"", "axis=choice"),
+            ("lbs+hue=red", "\"hue=red\"", "clamp"),
+            ("lbs+colour=none+colour=none", "\"colour=none\"", "once"),
+        ] {
+            let message = spec.parse::<Strategy>().unwrap_err().to_string();
+            assert!(message.contains(part) && message.contains(known), "{spec}: {message}");
+        }
+    }
+}
