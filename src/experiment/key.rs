@@ -1,13 +1,14 @@
 //! Content keys: what a number depends on, hashed.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
 
 /// Versions of the code that numbers depend on. They are part of every key, so raising one makes a run redo what it
 /// influences. Raise one by hand, with a line in CHANGELOG.md, whenever a change moves numbers by more than rounding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CodeVersions {
     /// Avatars made from frames, and the loading of those frames.
     pub fit: u32,

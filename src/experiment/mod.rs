@@ -32,4 +32,4 @@ pub use profile::{Options, Profile, Subset, evenly_spaced};
 pub use record::{FrameRecord, Outcome, Records, Seconds};
 pub use rows::{DataRow, Source};
 pub use shard::Shard;
-pub use spec::{AvatarRecipe, Average, Column, Experiment, Layout, StandIn, Variant};
+pub use spec::{ADDED_VARIANT, AvatarRecipe, Average, Column, Experiment, Layout, StandIn, Variant};

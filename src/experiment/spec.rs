@@ -5,6 +5,9 @@ use crate::metrics::MetricKind;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+/// How the ids of variants begin that [`Experiment::with_strategies`] adds.
+pub const ADDED_VARIANT: &str = "strategy-";
+
 /// One table: what to ask of which data. See `experiments/README.md` for the file format.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -253,7 +256,7 @@ impl Experiment {
             };
             if !extended.variants.iter().any(known) {
                 extended.variants.push(Variant {
-                    id: format!("strategy-{id}"),
+                    id: format!("{ADDED_VARIANT}{id}"),
                     label: title.to_owned(),
                     paper: None,
                     strategy: Some(id.to_owned()),

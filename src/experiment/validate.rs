@@ -119,11 +119,13 @@ fn variant_is_possible(variant: &Variant, key: &str, file: &str) -> Result<(), E
 /// A stand-in never carries the name of the data set that it stands in for.
 fn stand_in_keeps_its_name(e: &Experiment, file: &str) -> Result<(), Error> {
     let Some(stand_in) = &e.stand_in else { return Ok(()) };
-    let caption = stand_in.caption.to_lowercase();
-    for name in [&e.dataset, &e.dataset_title] {
-        if caption.contains(&name.to_lowercase()) {
-            let problem = format!("names `{name}`");
-            return Err(Error::invalid(file, "stand_in.caption", problem, "a caption that does not"));
+    let notes = e.notes.iter().map(|note| ("notes", note));
+    for (key, text) in [("stand_in.caption", &stand_in.caption)].into_iter().chain(notes) {
+        for name in [&e.dataset, &e.dataset_title] {
+            if text.to_lowercase().contains(&name.to_lowercase()) {
+                let problem = format!("names `{name}`");
+                return Err(Error::invalid(file, key, problem, "text that also fits a stand-in"));
+            }
         }
     }
     Ok(())

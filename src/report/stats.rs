@@ -158,7 +158,8 @@ mod tests {
         let smooth: Vec<f64> = (0..64).map(|i| (f64::from(i) * 0.2).sin()).collect();
         let shuffled: Vec<f64> = (0..64).map(|i| smooth[(i * 37) % 64]).collect();
         let width = |values: &[f64]| {
-            let [low, high] = paired(&[values.to_vec()], true).expect("finite").interval.expect("enough frames");
+            let [low, high] =
+                paired(&[values.to_vec()], true).expect("finite").interval.expect("enough frames");
             high - low
         };
         assert!(width(&smooth) > 1.4 * width(&shuffled), "{} {}", width(&smooth), width(&shuffled));

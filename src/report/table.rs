@@ -1,5 +1,6 @@
 //! The table as a value: the one thing that Markdown, CSV, JSON and LaTeX are written from.
 
+use super::stats::Paired;
 use crate::experiment::Source;
 use crate::metrics::MetricKind;
 use serde::{Deserialize, Serialize};
@@ -28,8 +29,36 @@ pub struct Table {
     pub notes: Vec<String>,
     /// Remarks that belong to the table as a whole.
     pub remarks: Vec<String>,
-    /// The paper's numbers, where they do not compare with the table's.
+    /// Variants compared frame by frame, per sequence and over all of them.
+    pub comparisons: Vec<Comparison>,
+    /// The paper's own table.
     pub paper: Option<Box<Table>>,
+}
+
+/// Two variants compared frame by frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Comparison {
+    /// The sequence; none for all of them together.
+    pub sequence: Option<String>,
+    /// Label of the variant.
+    pub variant: String,
+    /// Label of the variant that it is compared with.
+    pub baseline: String,
+    /// One per metric that frames have.
+    pub differences: Vec<MetricDifference>,
+}
+
+/// How two variants differ in a metric.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MetricDifference {
+    /// The metric.
+    pub metric: MetricKind,
+    /// Digits after the point.
+    pub decimals: usize,
+    /// The difference; none if no frame was scored for both or one is infinite.
+    pub paired: Option<Paired>,
 }
 
 /// A metric column.
@@ -85,6 +114,10 @@ pub struct Row {
     pub labels: Vec<String>,
     /// One per [`Table::columns`].
     pub cells: Vec<Cell>,
+    /// Frames behind the numbers, over the row's sequences.
+    pub frames: usize,
+    /// Frames that should be behind them and are not.
+    pub missing: usize,
 }
 
 /// What a cell holds.
@@ -133,9 +166,7 @@ pub struct Cell {
     pub text: String,
     /// Whether it is the best of its sequence, judged on the printed digits.
     pub best: bool,
-    /// Frames behind the number.
-    pub frames: usize,
-    /// Frames that should be behind it and are not.
+    /// Frames that should be behind the number and are not.
     pub missing: usize,
     /// Footnotes: indices into [`Table::notes`].
     pub notes: Vec<usize>,
@@ -150,12 +181,25 @@ impl Cell {
             Content::NotComputed => "n/c".to_owned(),
             Content::NotApplicable | Content::Missing => "—".to_owned(),
         };
-        Self { content, text, best: false, frames: 0, missing: 0, notes: Vec::new() }
+        Self { content, text, best: false, missing: 0, notes: Vec::new() }
+    }
+
+    /// A difference, printed with its sign.
+    pub fn difference(value: f64, decimals: usize) -> Self {
+        let cell = Self::new(Content::number(value), decimals);
+        let signed = value > 0.0 && cell.printed() != Some(0.0);
+        Self { text: if signed { format!("+{}", cell.text) } else { cell.text.clone() }, ..cell }
     }
 
     /// A cell without a number.
     pub fn empty() -> Self {
         Self::new(Content::NotApplicable, 0)
+    }
+
+    /// The numbers of its footnotes, from 1, separated by commas.
+    pub fn footnotes(&self) -> Option<String> {
+        let numbers: Vec<String> = self.notes.iter().map(|note| (note + 1).to_string()).collect();
+        (!numbers.is_empty()).then(|| numbers.join(","))
     }
 
     /// The value of the printed digits.
@@ -177,8 +221,8 @@ fn round(value: f64, decimals: usize) -> String {
 /// Marks the best cells of each column among rows that compare with each other. Equal digits are equally good. Nothing
 /// is marked in a column where a number is missing or rests on fewer frames than planned, or where there is only one
 /// number: there the rows do not compare.
-pub fn mark_best(rows: &mut [&mut Vec<Cell>], columns: &[(MetricKind, usize)]) {
-    for (c, (metric, _)) in columns.iter().enumerate() {
+pub(super) fn mark_best(rows: &mut [&mut Vec<Cell>], columns: impl Iterator<Item = MetricKind>) {
+    for (c, metric) in columns.enumerate() {
         let values: Vec<f64> = rows.iter().filter_map(|cells| cells[c].printed()).collect();
         let comparable = rows.iter().all(|cells| {
             let cell = &cells[c];
@@ -205,7 +249,7 @@ mod tests {
 
     fn bests(metric: MetricKind, cells: Vec<Cell>) -> Vec<bool> {
         let mut rows: Vec<Vec<Cell>> = cells.into_iter().map(|cell| vec![cell]).collect();
-        mark_best(&mut rows.iter_mut().collect::<Vec<_>>(), &[(metric, 0)]);
+        mark_best(&mut rows.iter_mut().collect::<Vec<_>>(), std::iter::once(metric));
         rows.iter().map(|cells| cells[0].best).collect()
     }
 
@@ -226,7 +270,10 @@ mod tests {
         assert_eq!(bests(MetricKind::Lpips, vec![none.clone(), number(0.1, 4)]), [false, false]);
         assert_eq!(bests(MetricKind::Lpips, vec![none.clone(), none]), [false, false]);
         assert_eq!(bests(MetricKind::Splats, vec![Cell::empty(), number(9.0, 0)]), [false, false]);
-        assert_eq!(bests(MetricKind::Splats, vec![Cell::empty(), number(9.0, 0), number(8.0, 0)]), [false, false, true]);
+        assert_eq!(
+            bests(MetricKind::Splats, vec![Cell::empty(), number(9.0, 0), number(8.0, 0)]),
+            [false, false, true]
+        );
     }
 
     #[test]

@@ -1,0 +1,102 @@
+//! What a table says about where its numbers come from.
+
+use super::results::SequenceResults;
+use crate::experiment::{Experiment, Options, PlannedTable, Profile, Source, Subset};
+
+/// The table's caption: of its own data, or the stand-in's, which does not name that data.
+pub(super) fn caption(experiment: &Experiment, source: Source) -> String {
+    match (&experiment.stand_in, source) {
+        (Some(stand_in), Source::StandIn | Source::Absent) => stand_in.caption.clone(),
+        _ => experiment.caption.clone(),
+    }
+}
+
+/// Data, protocol, profile and frames, a sentence each.
+pub(super) fn ran_on(
+    experiment: &Experiment,
+    planned: &PlannedTable,
+    options: &Options,
+    sequences: &[SequenceResults],
+) -> Vec<String> {
+    let names: Vec<String> = planned
+        .datasets
+        .iter()
+        .map(|(id, title)| if id == title { id.clone() } else { format!("{title} ({id})") })
+        .collect();
+    let names = names.join(", ");
+    let data = match (planned.source, &experiment.stand_in) {
+        (Source::Own, _) => format!("Ran on: {names}"),
+        (Source::StandIn, Some(stand_in)) => {
+            let kind = stand_in.capture.describe();
+            format!(
+                "Ran on: {names}, a stand-in ({kind}); not the paper's data and not comparable with its numbers"
+            )
+        }
+        _ => return vec!["Not run: no data for this table".to_owned()],
+    };
+    let mut sentences = vec![
+        data,
+        format!("Protocol: {}, version {}", planned.protocol.id, planned.protocol.version),
+        profile(&options.profile),
+        frames(sequences),
+    ];
+    if !options.subset.is_everything() {
+        sentences.push(subset(&options.subset));
+    }
+    if let Some(average) = &experiment.average {
+        sentences.push(format!("{}: each sequence counts once", average.label));
+    }
+    sentences
+}
+
+fn profile(profile: &Profile) -> String {
+    let mut bounds = Vec::new();
+    if let Some(n) = profile.max_test_frames {
+        bounds.push(format!("at most {n} test frames per sequence"));
+    }
+    if let Some(n) = profile.max_train_frames {
+        bounds.push(format!("at most {n} training frames"));
+    }
+    if let Some(side) = profile.resolution {
+        bounds.push(format!("images of at most {side} pixels a side"));
+    }
+    match bounds.is_empty() {
+        true => format!("Profile: {}, every frame at native resolution", profile.id),
+        false => format!("Profile: {}, {}", profile.id, bounds.join(", ")),
+    }
+}
+
+/// How many frames a variant was planned to be scored on.
+fn frames(sequences: &[SequenceResults]) -> String {
+    let counts: Vec<usize> =
+        sequences.iter().map(|s| s.variants.first().map_or(0, |variant| variant.frames.len())).collect();
+    let total: usize = counts.iter().sum();
+    let spread = match (counts.iter().min(), counts.iter().max()) {
+        (Some(low), Some(high)) if low == high => format!("{low} each"),
+        (Some(low), Some(high)) => format!("{low} to {high} each"),
+        _ => "none".to_owned(),
+    };
+    format!("Frames: {total} per variant, in {} ({spread})", count(sequences.len(), "sequence"))
+}
+
+fn subset(subset: &Subset) -> String {
+    let mut parts = Vec::new();
+    if let Some([start, end]) = subset.frames {
+        parts.push(format!("frames {start}..{end}"));
+    }
+    if let Some(limit) = subset.limit {
+        parts.push(format!("at most {} per sequence", count(limit, "frame")));
+    }
+    if !subset.subjects.is_empty() {
+        parts.push(format!("subjects {}", subset.subjects.join(", ")));
+    }
+    if !subset.variants.is_empty() {
+        parts.push(format!("variants {}", subset.variants.join(", ")));
+    }
+    format!("Partial: {}", parts.join("; "))
+}
+
+/// `1 frame`, `2 frames`.
+pub(super) fn count(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}

@@ -1,0 +1,115 @@
+//! Records to results: what each planned frame became, and the protocol's aggregate of each sequence.
+
+use super::results::{FrameResult, Results, SCHEMA, SequenceResults, TableResults, VariantResults};
+use super::{Error, build};
+use crate::experiment::{
+    CodeVersions, DataRow, Experiment, Job, Outcome, Plan, PlannedTable, Records, Variant,
+};
+use crate::metrics::{FrameScore, Protocol};
+
+/// The results of a plan: pure, and the same for the same records in whatever order they were made.
+///
+/// # Errors
+/// If the plan is not of these experiments, or a record's score is of another protocol than its key says.
+pub fn results(plan: &Plan, experiments: &[Experiment], records: &Records) -> Result<Results, Error> {
+    let tables = plan.tables.iter().enumerate().map(|(index, planned)| {
+        let experiment = experiments
+            .iter()
+            .find(|experiment| experiment.id == planned.experiment)
+            .ok_or_else(|| Error::Unplanned { experiment: planned.experiment.clone() })?;
+        let jobs: Vec<&Job> = plan.jobs.iter().filter(|job| job.table == index).collect();
+        table(plan, planned, experiment, &jobs, records)
+    });
+    Ok(Results {
+        schema: SCHEMA,
+        plan: plan.digest.clone(),
+        options: plan.options.clone(),
+        code: CodeVersions::CURRENT,
+        tables: tables.collect::<Result<_, _>>()?,
+    })
+}
+
+fn table(
+    plan: &Plan,
+    planned: &PlannedTable,
+    experiment: &Experiment,
+    jobs: &[&Job],
+    records: &Records,
+) -> Result<TableResults, Error> {
+    let spec = experiment.protocol_on(planned.source);
+    let protocol =
+        Protocol::parse(spec).map_err(|source| Error::Scores { at: experiment.id.clone(), source })?;
+    let variants: Vec<&Variant> = planned.variants.iter().filter_map(|id| experiment.variant(id)).collect();
+    let sequences = planned.rows.iter().enumerate().map(|(r, row)| {
+        let jobs: Vec<&Job> = jobs.iter().copied().filter(|job| job.row == r).collect();
+        sequence(row, &variants, &jobs, records, &protocol)
+    });
+    let sequences: Vec<SequenceResults> = sequences.collect::<Result<_, _>>()?;
+    Ok(TableResults {
+        experiment: experiment.id.clone(),
+        version: experiment.version,
+        protocol: planned.protocol.clone(),
+        datasets: planned.datasets.clone(),
+        table: build::table(experiment, planned, &plan.options, &sequences),
+        sequences,
+    })
+}
+
+fn sequence(
+    row: &DataRow,
+    variants: &[&Variant],
+    jobs: &[&Job],
+    records: &Records,
+    protocol: &Protocol,
+) -> Result<SequenceResults, Error> {
+    let of_variant = |variant: &&Variant| -> Result<VariantResults, Error> {
+        let planned = jobs.iter().filter_map(|job| {
+            let key = &job.variants.iter().find(|v| v.id == variant.id)?.key;
+            Some((*job, key.as_str()))
+        });
+        let (frames, splats): (Vec<FrameResult>, Vec<Option<u64>>) =
+            planned.map(|(job, key)| frame(job, key, records)).unzip();
+        let scores: Vec<FrameScore> = frames.iter().filter_map(|frame| frame.score.clone()).collect();
+        let summary = (!scores.is_empty()).then(|| protocol.aggregate(&scores)).transpose();
+        Ok(VariantResults {
+            id: variant.id.clone(),
+            label: variant.label.clone(),
+            avatar: variant.avatar.clone(),
+            sh_degree: variant.sh_degree,
+            strategy: variant.strategy.clone(),
+            summary: summary
+                .map_err(|source| Error::Scores { at: format!("{}, {}", row.id, variant.id), source })?,
+            splats: splats.into_iter().flatten().max(),
+            frames,
+        })
+    };
+    Ok(SequenceResults {
+        id: row.id.clone(),
+        label: row.label.clone(),
+        missing: row.missing.clone(),
+        variants: variants.iter().map(of_variant).collect::<Result<_, _>>()?,
+    })
+}
+
+/// A planned frame and the Gaussians of its avatar.
+fn frame(job: &Job, key: &str, records: &Records) -> (FrameResult, Option<u64>) {
+    let mut result = FrameResult {
+        frame: job.frame,
+        name: job.name.clone(),
+        key: key.to_owned(),
+        score: None,
+        visible_splats: None,
+        error: None,
+    };
+    let mut count = None;
+    match records.get(key).map(|record| &record.outcome) {
+        Some(Outcome::Scored { score, splats, visible_splats }) => {
+            result.score = Some(score.clone());
+            result.visible_splats = *visible_splats;
+            count = *splats;
+        }
+        Some(Outcome::Error(error)) => result.error = Some(error.clone()),
+        None => {}
+    }
+    (result, count)
+}

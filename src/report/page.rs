@@ -1,0 +1,52 @@
+//! `tables.md`: every table of a run on one page.
+
+use super::captions::count;
+use super::{Results, markdown};
+use crate::experiment::{ADDED_VARIANT, Options};
+
+/// The page: how it was made, what is missing, and the tables.
+pub fn page(results: &Results) -> String {
+    let mut text = format!(
+        "# Results\n\nMade by `{}`. Nothing on this page depends on the time or the machine. The best value of a sequence \
+         is bold, judged on the printed digits; equal digits are equally good. ↑: more is better, ↓: less is better; \
+         n/c: not computed.\n\n",
+        command(results)
+    );
+    let code = results.code;
+    text += &format!(
+        "Plan `{}`; code versions: fit {}, strategy {}, render {}, metrics {}.\n",
+        results.plan, code.fit, code.strategy, code.render, code.metrics
+    );
+    match results.missing() {
+        0 => {}
+        missing => {
+            text += &format!("\n**Incomplete: {} missing; see the footnotes.**\n", count(missing, "score"))
+        }
+    }
+    for table in &results.tables {
+        text.push('\n');
+        text += &markdown(&table.table);
+    }
+    text
+}
+
+/// The command that makes these tables again, from the same data.
+fn command(results: &Results) -> String {
+    let Options { profile, subset } = &results.options;
+    let mut words = vec!["reproduce run".to_owned()];
+    words.extend(results.tables.iter().map(|table| table.experiment.clone()));
+    words.push(format!("--profile {}", profile.id));
+    let variants = results.tables.iter().flat_map(|t| &t.sequences).flat_map(|sequence| &sequence.variants);
+    if variants.map(|variant| &variant.id).any(|id| id.starts_with(ADDED_VARIANT)) {
+        words.push("--all-strategies".to_owned());
+    }
+    if let Some([start, end]) = subset.frames {
+        words.push(format!("--frames {start}..{end}"));
+    }
+    if let Some(limit) = subset.limit {
+        words.push(format!("--limit {limit}"));
+    }
+    words.extend(subset.subjects.iter().map(|id| format!("--subject {id}")));
+    words.extend(subset.variants.iter().map(|id| format!("--variant {id}")));
+    words.join(" ")
+}

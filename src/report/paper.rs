@@ -1,0 +1,95 @@
+//! The paper's numbers: beside ours where they compare, as a table of their own otherwise.
+
+use super::build::Notes;
+use super::layout::{Entry, shape};
+use super::table::{Cell, Content, RowKind, Table};
+use crate::experiment::{Experiment, Paper, PaperRow, Printed, Source};
+
+/// The printed numbers that belong beside an entry, and the differences to them: on the table's own data only, and only
+/// for a variant that the paper has.
+pub(super) fn beside(
+    experiment: &Experiment,
+    source: Source,
+    variant: &str,
+    ours: &Entry,
+    notes: &mut Notes,
+) -> Vec<Entry> {
+    let row = || {
+        let paper = experiment.paper.as_ref().filter(|_| source == Source::Own)?;
+        let id = experiment.variant(variant)?.paper.as_deref()?;
+        match ours.kind {
+            RowKind::Mean => paper.average(id),
+            _ => paper.row(&ours.sequence, id),
+        }
+    };
+    let Some(row) = row() else { return Vec::new() };
+    let printed = entry(experiment, row, &ours.sequence, &ours.variant, notes);
+    let differences =
+        ours.cells.iter().zip(&printed.cells).zip(&experiment.columns).map(|((a, b), column)| {
+            match (a.content, b.content) {
+                (Content::Number(a), Content::Number(b)) => Cell::difference(a - b, column.decimals()),
+                _ => Cell::empty(),
+            }
+        });
+    let differences = Entry {
+        sequence: ours.sequence.clone(),
+        variant: format!("{} − paper", ours.variant),
+        kind: RowKind::Difference,
+        cells: differences.collect(),
+        frames: ours.frames,
+        missing: ours.missing,
+    };
+    vec![Entry { variant: format!("{}, paper", ours.variant), ..printed }, differences]
+}
+
+/// The table as the paper prints it.
+pub(super) fn printed_table(experiment: &Experiment, paper: &Paper) -> Table {
+    let mut notes = Notes::default();
+    let average = |row: &PaperRow| match (&experiment.average, row.average) {
+        (Some(average), true) => average.label.clone(),
+        _ => row.sequence.clone(),
+    };
+    let entries = paper.rows.iter().map(|row| {
+        let label = paper.label(&row.variant).unwrap_or(&row.variant);
+        entry(experiment, row, &average(row), label, &mut notes)
+    });
+    let shape = shape(experiment.layout, &experiment.columns, entries.collect());
+    Table {
+        id: format!("{}-paper", experiment.id),
+        title: format!("{} of {}, as printed", experiment.title, paper.source),
+        caption: paper.caption.clone(),
+        ran_on: vec!["The paper's values, on its data and avatars".to_owned()],
+        source: Source::Own,
+        labels: shape.labels,
+        columns: shape.columns,
+        rows: shape.rows,
+        notes: notes.into_vec(),
+        remarks: paper.note.iter().cloned().collect(),
+        comparisons: Vec::new(),
+        paper: None,
+    }
+}
+
+/// A printed row, its digits and its bold.
+fn entry(experiment: &Experiment, row: &PaperRow, sequence: &str, variant: &str, notes: &mut Notes) -> Entry {
+    let doubt = row.doubt.as_ref().map(|doubt| notes.index(format!("{sequence}, {variant}: {doubt}")));
+    let cell = |printed: &Printed, best: bool, doubtful: bool| Cell {
+        text: printed.to_string(),
+        best,
+        notes: doubt.filter(|_| doubtful).into_iter().collect(),
+        ..Cell::new(Content::Number(printed.value()), printed.decimals())
+    };
+    let cells = experiment.columns.iter().map(|column| {
+        let doubtful = row.doubt.as_ref().is_some_and(|doubt| doubt.starts_with(column.metric.id()));
+        let printed = row.value(column.metric);
+        printed.map_or_else(Cell::empty, |p| cell(p, row.bold.contains(&column.metric), doubtful))
+    });
+    Entry {
+        sequence: sequence.to_owned(),
+        variant: variant.to_owned(),
+        kind: RowKind::Paper,
+        cells: cells.collect(),
+        frames: 0,
+        missing: 0,
+    }
+}

@@ -1,0 +1,165 @@
+//! The results document, `results.json`: every table, sequence and frame of a run. Nothing in it depends on the time or
+//! the machine. `reports/SCHEMA.md` describes it key by key.
+
+use super::table::Table;
+use crate::experiment::{AvatarRecipe, CodeVersions, Options};
+use crate::metrics::{FrameScore, MetricKind, ProtocolId, Summary};
+use serde::{Deserialize, Serialize};
+
+/// Version of the document's format.
+pub const SCHEMA: u32 = 1;
+
+/// Everything that a run found out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Results {
+    /// Version of the format: [`SCHEMA`].
+    pub schema: u32,
+    /// Digest of the plan.
+    pub plan: String,
+    /// What was asked for.
+    pub options: Options,
+    /// Versions of the code behind the numbers.
+    pub code: CodeVersions,
+    /// One per experiment.
+    pub tables: Vec<TableResults>,
+}
+
+impl Results {
+    /// The document as text: JSON, indented, with a final newline.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("keys are strings and infinities have their own form")
+            + "\n"
+    }
+
+    /// Reads a document.
+    ///
+    /// # Errors
+    /// One line that says what is wrong and where.
+    pub fn from_json(text: &str) -> Result<Self, String> {
+        /// Whatever else changes, every version has this.
+        #[derive(Deserialize)]
+        struct Versioned {
+            schema: u32,
+        }
+        let versioned: Versioned = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        if versioned.schema != SCHEMA {
+            return Err(format!("schema: {}; expected {SCHEMA}, which this program reads", versioned.schema));
+        }
+        serde_json::from_str(text).map_err(|error| error.to_string())
+    }
+
+    /// Frames that were planned and have no score, over all tables.
+    pub fn missing(&self) -> usize {
+        let variants = self.tables.iter().flat_map(|t| &t.sequences).flat_map(|sequence| &sequence.variants);
+        variants.map(VariantResults::missing).sum()
+    }
+}
+
+/// One table and what it was made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableResults {
+    /// Id of the experiment.
+    pub experiment: String,
+    /// Version of the experiment.
+    pub version: u32,
+    /// The scoring protocol.
+    pub protocol: ProtocolId,
+    /// The data sets that took part: id and title.
+    pub datasets: Vec<(String, String)>,
+    /// The table.
+    pub table: Table,
+    /// The sequences, each with every variant and frame.
+    pub sequences: Vec<SequenceResults>,
+}
+
+/// A sequence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SequenceResults {
+    /// `dataset/subject/sequence`.
+    pub id: String,
+    /// What the table calls it.
+    pub label: String,
+    /// Why there are no frames, if there are none.
+    pub missing: Option<String>,
+    /// In the order of the experiment.
+    pub variants: Vec<VariantResults>,
+}
+
+/// A variant on a sequence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VariantResults {
+    /// Id of the variant.
+    pub id: String,
+    /// What the table calls it.
+    pub label: String,
+    /// Where the avatar came from.
+    pub avatar: AvatarRecipe,
+    /// SH degree of an avatar that was made here.
+    pub sh_degree: Option<u8>,
+    /// Strategy spec; none for a textured mesh.
+    pub strategy: Option<String>,
+    /// The metrics over the scored frames, aggregated as the protocol says; none without a scored frame.
+    pub summary: Option<Summary>,
+    /// Gaussians in the avatar; none for a textured mesh.
+    pub splats: Option<u64>,
+    /// Every planned frame, in order.
+    pub frames: Vec<FrameResult>,
+}
+
+impl VariantResults {
+    /// Frames that were scored.
+    pub fn scored(&self) -> usize {
+        self.frames.iter().filter(|frame| frame.score.is_some()).count()
+    }
+
+    /// Frames that were planned and have no score.
+    pub fn missing(&self) -> usize {
+        self.frames.len() - self.scored()
+    }
+
+    /// The metric over the scored frames.
+    pub fn value(&self, metric: MetricKind) -> Option<f64> {
+        let summary = self.summary.as_ref()?;
+        match metric {
+            MetricKind::Psnr => Some(summary.psnr),
+            MetricKind::Ssim => Some(summary.ssim),
+            MetricKind::Lpips => summary.lpips,
+            MetricKind::Splats => self.splats.map(|count| count as f64),
+        }
+    }
+}
+
+/// A frame: scored, failed (with an error) or not run (with neither).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameResult {
+    /// Index in its sequence.
+    pub frame: usize,
+    /// Name of the image.
+    pub name: String,
+    /// Content key.
+    pub key: String,
+    /// The metrics.
+    pub score: Option<FrameScore>,
+    /// Gaussians that reach the image; none for a textured mesh.
+    pub visible_splats: Option<u64>,
+    /// Why it failed.
+    pub error: Option<String>,
+}
+
+impl FrameResult {
+    /// The frame's own value of a metric; none for what only a sequence has.
+    pub fn value(&self, metric: MetricKind) -> Option<f64> {
+        let score = self.score.as_ref()?;
+        match metric {
+            MetricKind::Psnr => Some(score.psnr),
+            MetricKind::Ssim => Some(score.ssim),
+            MetricKind::Lpips => score.lpips,
+            MetricKind::Splats => None,
+        }
+    }
+}

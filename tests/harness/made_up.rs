@@ -1,0 +1,99 @@
+//! Made-up data sets, experiments and scores.
+
+use skinsplat::experiment::{
+    AvatarFile, Capture, Dataset, Experiment, FrameInfo, FrameRecord, Options, Outcome, Plan, Profile,
+    Records, Role, Seconds, SequenceInfo, SubjectInfo, Subset,
+};
+use skinsplat::metrics::{FrameScore, Protocol};
+
+/// A seventh table: not one of the paper's, on a data set that no code knows.
+pub const TABLE_7: &str = include_str!("table7.toml");
+
+pub fn table_7() -> Experiment {
+    Experiment::parse(TABLE_7, "table7.toml").unwrap()
+}
+
+/// The seventh table in the wide layout.
+pub fn wide_table_7() -> Experiment {
+    let text = TABLE_7.replace("layout = \"rows\"", "layout = \"wide\"").replace("\"Mean\"", "\"All\"");
+    Experiment::parse(&text, "table7.toml").unwrap()
+}
+
+pub fn options() -> Options {
+    Options { profile: Profile::standard(), subset: Subset::default() }
+}
+
+pub fn sequence(id: &str, role: Role, frames: usize) -> SequenceInfo {
+    let frame = |time| FrameInfo { name: format!("image_{time:04}"), time, camera: 0 };
+    let digest = format!("digest of {id}");
+    SequenceInfo { id: id.into(), role, digest, frames: (0..frames).map(frame).collect() }
+}
+
+pub fn subject(id: &str, capture: Capture, sequences: Vec<SequenceInfo>) -> SubjectInfo {
+    SubjectInfo { id: id.into(), capture, sequences, avatars: Vec::new() }
+}
+
+/// The seventh table's own data: subjects `anna` and `bob`.
+pub fn own_data(test_frames: usize) -> Dataset {
+    let person = |id: &str| {
+        let train = sequence(&format!("{id}-train"), Role::Train, 20);
+        let test = sequence(&format!("{id}-test"), Role::Test, test_frames);
+        let mut person = subject(id, Capture::Monocular, vec![train, test]);
+        person.avatars.push(AvatarFile { name: "fitted".into(), digest: format!("fitted {id}") });
+        person
+    };
+    Dataset { id: "gymnasts".into(), title: "Gymnasts".into(), subjects: vec![person("anna"), person("bob")] }
+}
+
+/// Data that may stand in: one subject of each kind of capture.
+pub fn figures() -> Dataset {
+    let figure = |id: &str, capture| {
+        let train = sequence(&format!("{id}-train"), Role::Train, 8);
+        let tests = [
+            sequence(&format!("{id}-twist"), Role::Test, 6),
+            sequence(&format!("{id}-squat"), Role::Test, 4),
+        ];
+        subject(id, capture, [train].into_iter().chain(tests).collect())
+    };
+    let subjects = vec![
+        figure("mono", Capture::Monocular),
+        figure("multi", Capture::Multiview),
+        figure("hands", Capture::Hands),
+    ];
+    Dataset { id: "figures".into(), title: "Figures".into(), subjects }
+}
+
+pub fn score(protocol: &str, psnr: f64, ssim: f64, lpips: Option<f64>) -> FrameScore {
+    let mse = 10_f64.powf(-psnr / 10.0);
+    FrameScore {
+        protocol: Protocol::parse(protocol).unwrap().key(),
+        pixels: 100,
+        channel_mse: [mse; 3],
+        mse,
+        psnr,
+        ssim,
+        lpips,
+    }
+}
+
+pub fn record(key: &str, outcome: Outcome) -> FrameRecord {
+    FrameRecord { key: key.into(), label: format!("label of {key}"), outcome, seconds: Seconds::default() }
+}
+
+pub fn scored(key: &str, score: FrameScore) -> FrameRecord {
+    record(key, Outcome::Scored { score, splats: Some(100), visible_splats: Some(90) })
+}
+
+/// A score for everything in the plan: frame k of variant v in row r has PSNR `20 + r + v / 2 + k / 10`.
+pub fn run(plan: &Plan) -> Records {
+    let mut records = Records::new();
+    for job in &plan.jobs {
+        for variant in &job.variants {
+            let v = plan.tables[job.table].variants.iter().position(|id| *id == variant.id).unwrap() as f64;
+            let psnr = 20.0 + job.row as f64 + v / 2.0 + job.frame as f64 / 10.0;
+            let score = score(&job.protocol, psnr, 0.9 + psnr / 1000.0, Some(0.2 - psnr / 1000.0));
+            records.insert(variant.key.clone(), scored(&variant.key, score));
+        }
+    }
+    records
+}

@@ -1,0 +1,11 @@
+//! The harness: experiment files, plans, the results store, tables.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod experiments;
+mod made_up;
+mod plans;
+mod reports;
+mod stores;
