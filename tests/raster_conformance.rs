@@ -1,9 +1,9 @@
 //! The splatting rasterizer against images that the original 3DGS kernels computed, and by property.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
 #[path = "support/splat_scene.rs"]
 mod splat_scene;
+mod support;
 
 use skinsplat::render::splat::{RenderSettings, Renderer, SimdLevel};
 use skinsplat::scene::Posed;

@@ -35,7 +35,7 @@ pub enum Event {
 }
 
 /// Samples per pixel side with which textured meshes are drawn: 16 samples on a rotated grid.
-const MESH_SAMPLES: u32 = 4;
+const MESH_SAMPLES: usize = 4;
 
 /// Does what the plan asks and the store has no record of. Interrupted at any point, it picks up where it left off.
 ///
@@ -171,7 +171,7 @@ fn run_variant(
     let (image, splats, visible_splats) = match avatar {
         Prepared::Textured(textured) => {
             let start = Instant::now();
-            let pattern = SamplePattern::rotated(MESH_SAMPLES)?;
+            let pattern = SamplePattern::new(MESH_SAMPLES);
             let rendered = textured.draw(&frame.body, frame.camera, pattern, background)?;
             seconds.render = start.elapsed().as_secs_f64();
             (rendered.image, None, None)
@@ -186,7 +186,7 @@ fn run_variant(
             let start = Instant::now();
             let rendered = renderer.render(&posed, frame.camera, &settings);
             seconds.render = start.elapsed().as_secs_f64();
-            (rendered.image, Some(posed.len() as u64), Some(rendered.visible as u64))
+            (rendered.image, Some(posed.len() as u64), Some(renderer.visible() as u64))
         }
     };
     let start = Instant::now();

@@ -73,6 +73,11 @@ impl Bins {
         self.splats.clear();
     }
 
+    /// Number of splats.
+    pub(super) fn len(&self) -> usize {
+        self.splats.len()
+    }
+
     /// Adds a splat; indices must rise.
     #[inline(always)]
     pub(super) fn push(&mut self, index: u32, depth: f32, strips: StripRect) {

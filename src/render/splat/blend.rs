@@ -111,13 +111,8 @@ fn alpha<L: Lanes>(l: L, paint: &Paint, x: L::F, y: L::F) -> L::F {
 #[inline(always)]
 fn exp2_negated<L: Lanes>(l: L, q: L::F) -> L::F {
     // Minimax in relative error for 2^f, |f| <= 1/2, with 2^0 = 1 exactly.
-    const POLYNOMIAL: [f32; 5] = [
-        0.001_326_472_7,
-        0.009_671_512_7,
-        0.055_507_337_4,
-        0.240_222_420_8,
-        0.693_146_977_6,
-    ];
+    const POLYNOMIAL: [f32; 5] =
+        [0.001_326_472_7, 0.009_671_512_7, 0.055_507_337_4, 0.240_222_420_8, 0.693_146_977_6];
     let n = l.round(q);
     let f = l.sub(n, q);
     let mut p = l.splat(POLYNOMIAL[0]);

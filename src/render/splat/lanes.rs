@@ -61,6 +61,25 @@ pub enum SimdLevel {
     Avx512,
 }
 
+impl SimdLevel {
+    /// The widest set that this processor has.
+    pub fn detected() -> Self {
+        [Self::Avx512, Self::Avx2]
+            .into_iter()
+            .find(|&l| Simd::of_level(l).is_some())
+            .unwrap_or(Self::Portable)
+    }
+
+    /// Name for reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            Self::Avx2 => "AVX2",
+            Self::Avx512 => "AVX-512",
+        }
+    }
+}
+
 /// A set of vector instructions that this processor has.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Simd {

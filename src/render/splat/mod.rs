@@ -94,6 +94,11 @@ impl Renderer {
         Self { simd, splats: Vec::new(), bins: Vec::new(), scratch: Vec::new() }
     }
 
+    /// Number of Gaussians that reached the image of the last frame drawn.
+    pub fn visible(&self) -> usize {
+        self.bins.iter().map(Bins::len).sum()
+    }
+
     /// Draws one frame.
     ///
     /// # Panics
