@@ -443,7 +443,7 @@ fn lanes_in_f32() {
                     check_average(case, quat, &mut worst, what);
                 } else {
                     assert!(case.number("gap_rel") < 0.08, "{}: not settled", case.name);
-                    assert_eq!(quat, rotation::identity());
+                    assert_eq!(quat, rotation::identity::<f32>());
                     rescued += 1;
                 }
             }

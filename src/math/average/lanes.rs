@@ -69,7 +69,7 @@ fn dominant<const N: usize>(mut a: Symmetric<N>) -> Lanes<N> {
     let mut squared = square(&a);
     let mut rest = rest_of_trace(&squared);
     for _ in 1..SQUARINGS {
-        if rest.iter().all(|&r| r <= RANK_ONE) {
+        if rest.iter().all(|&r| r.abs() <= RANK_ONE) {
             break;
         }
         for i in 0..N {
@@ -77,7 +77,7 @@ fn dominant<const N: usize>(mut a: Symmetric<N>) -> Lanes<N> {
         }
         for (entry, next) in a.iter_mut().zip(&squared) {
             for i in 0..N {
-                entry[i] = if rest[i] <= RANK_ONE { entry[i] } else { next[i] * inverse_trace[i] };
+                entry[i] = if rest[i].abs() <= RANK_ONE { entry[i] } else { next[i] * inverse_trace[i] };
             }
         }
         squared = square(&a);
@@ -134,7 +134,7 @@ fn leading_vector<const N: usize>(s: &Symmetric<N>, rest: &[f32; N]) -> Lanes<N>
     for i in 0..N {
         let [w, x, y, z] = [0, 1, 2, 3].map(|k: usize| quats[k][i]);
         let inverse = 1.0 / ((w * w + x * x) + (y * y + z * z)).sqrt();
-        settled[i] = rest[i] <= RANK_ONE;
+        settled[i] = rest[i].abs() <= RANK_ONE;
         quats[0][i] = if settled[i] { w * inverse } else { 1.0 };
         quats[1][i] = if settled[i] { x * inverse } else { 0.0 };
         quats[2][i] = if settled[i] { y * inverse } else { 0.0 };
