@@ -10,9 +10,10 @@
 //! ```
 //! Sequences named `train*` are for fitting, those named `test*` for evaluation.
 
-use super::{Error, Sequence, body, camera, error, npy, poses};
+use super::poses::{self, PoseTrack};
+use super::{Error, Sequence, body, camera, error, npy};
 use super::{FrameRef, FrameSource};
-use crate::scene::{Body, RestBody};
+use crate::scene::{Body, Camera, RestBody};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -58,16 +59,16 @@ impl Subject {
     /// # Errors
     /// A folder without sequences, missing files, inconsistent cameras, poses, frames or body.
     pub fn load(folder: &Path, options: &Options) -> Result<Self, Error> {
-        let mut loader = Loader { folder, options, models: BTreeMap::new() };
+        let mut models = Models::new(folder, options);
         let mut split = |prefix: &str| -> Result<Vec<Sequence>, Error> {
             let names = sequence_folders(folder, prefix)?;
-            names.iter().map(|name| loader.sequence(&folder.join(name), name)).collect()
+            names.iter().map(|name| load_sequence(&folder.join(name), name, &mut models)).collect()
         };
         let (train, test) = (split("train")?, split("test")?);
-        let Some(capture) = capture(train.iter().chain(&test)) else {
-            let expected = "folders train* and test* with transforms.json";
-            return Err(Error::invalid(folder, "sequences", "none", expected));
-        };
+        let sequences = || train.iter().chain(&test);
+        let cameras = sequences().map(|s| s.cameras.len()).max();
+        let joints = sequences().map(|s| s.body.skeleton.num_joints()).max();
+        let capture = Capture::of(folder, cameras.zip(joints))?;
         let id = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         Ok(Self { id, capture, train, test })
     }
@@ -90,14 +91,36 @@ pub fn is_subject(folder: &Path) -> bool {
         .any(|prefix| sequence_folders(folder, prefix).is_ok_and(|names| !names.is_empty()))
 }
 
-fn capture<'a>(sequences: impl Iterator<Item = &'a Sequence> + Clone) -> Option<Capture> {
-    let joints = sequences.clone().map(|s| s.body.skeleton.num_joints()).max()?;
-    let cameras = sequences.map(|s| s.cameras.len()).max()?;
-    Some(match (cameras, joints) {
-        (2.., _) => Capture::MultiCamera,
-        (_, 55..) => Capture::Expressive,
-        _ => Capture::Monocular,
-    })
+/// How a subject was captured, found without loading its body.
+///
+/// # Errors
+/// A folder without sequences, unreadable cameras or poses.
+pub fn inspect(folder: &Path) -> Result<Capture, Error> {
+    let mut most = None;
+    for name in
+        ["train", "test"].iter().map(|p| sequence_folders(folder, p)).collect::<Result<Vec<_>, _>>()?.concat()
+    {
+        let files = Files::of(&folder.join(name));
+        let (cameras, joints) = most.unwrap_or((0, 0));
+        let (more_cameras, more_joints) = (files.cameras()?.len(), files.poses()?.num_joints());
+        most = Some((cameras.max(more_cameras), joints.max(more_joints)));
+    }
+    Capture::of(folder, most)
+}
+
+impl Capture {
+    /// From the largest numbers of cameras and joints of a subject's sequences.
+    fn of(folder: &Path, cameras_and_joints: Option<(usize, usize)>) -> Result<Self, Error> {
+        match cameras_and_joints {
+            None => {
+                let expected = "folders train* and test* with transforms.json";
+                Err(Error::invalid(folder, "sequences", "none", expected))
+            }
+            Some((2.., _)) => Ok(Self::MultiCamera),
+            Some((_, 55..)) => Ok(Self::Expressive),
+            Some(_) => Ok(Self::Monocular),
+        }
+    }
 }
 
 fn sequence_folders(folder: &Path, prefix: &str) -> Result<Vec<String>, Error> {
@@ -126,58 +149,77 @@ struct ListedFrame {
     time: usize,
 }
 
-struct Loader<'a> {
-    folder: &'a Path,
-    options: &'a Options,
-    models: BTreeMap<PathBuf, Model>,
+/// Where a sequence keeps its parts.
+struct Files {
+    folder: PathBuf,
+    listing: PathBuf,
 }
 
-/// A body model and the shapes of it that sequences share.
+impl Files {
+    fn of(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), listing: folder.join("transforms.json") }
+    }
+
+    fn cameras(&self) -> Result<Vec<Camera>, Error> {
+        camera::load(&self.or_listing("cameras.npz"))
+    }
+
+    fn poses(&self) -> Result<PoseTrack, Error> {
+        poses::load(&self.or_listing("poses.npz"))
+    }
+
+    fn or_listing(&self, name: &str) -> PathBuf {
+        let own = self.folder.join(name);
+        if own.is_file() { own } else { self.listing.clone() }
+    }
+}
+
+fn load_sequence(folder: &Path, id: &str, models: &mut Models) -> Result<Sequence, Error> {
+    let files = Files::of(folder);
+    let transforms: Transforms =
+        error::read_json(&files.listing, "frames", "model, cameras and frames of a sequence")?;
+    let cameras = files.cameras()?;
+    let track = files.poses()?;
+    let body = models.named(&files.listing, transforms.model.as_deref(), &track.betas)?;
+    let poses = track.poses(&body.skeleton)?;
+    let frames = frames_of(&files, transforms.frames, poses.len(), cameras.len())?;
+    Ok(Sequence { id: id.to_owned(), body, poses, cameras, frames, stored_sizes: None })
+}
+
+/// Body models that were loaded for a subject, and the shapes of them that its sequences share.
+pub(super) struct Models<'a> {
+    subject: &'a Path,
+    options: &'a Options,
+    loaded: BTreeMap<PathBuf, Model>,
+}
+
 struct Model {
     body: Body,
     shapes: Vec<(Vec<f64>, Arc<RestBody>)>,
 }
 
-impl Loader<'_> {
-    fn sequence(&mut self, folder: &Path, id: &str) -> Result<Sequence, Error> {
-        let listing = folder.join("transforms.json");
-        let transforms: Transforms =
-            error::read_json(&listing, "frames", "model, cameras and frames of a sequence")?;
-        let cameras = camera::load(&or(folder.join("cameras.npz"), &listing))?;
-        let track = poses::load(&or(folder.join("poses.npz"), &listing))?;
-        let model = self.model(&listing, transforms.model.as_deref())?;
-        let body = self.shaped(&model, &track.betas)?;
-        let poses = track.poses(&body.skeleton)?;
-        let frames = frames_of(folder, &listing, transforms.frames, poses.len(), cameras.len())?;
-        Ok(Sequence { id: id.to_owned(), body, poses, cameras, frames, stored_sizes: None })
+impl<'a> Models<'a> {
+    pub(super) fn new(subject: &'a Path, options: &'a Options) -> Self {
+        Self { subject, options, loaded: BTreeMap::new() }
     }
 
-    /// The body model that a sequence names, looked for in `models` beside and above the subject.
-    fn model(&self, listing: &Path, name: Option<&str>) -> Result<PathBuf, Error> {
-        if let Some(model) = &self.options.model {
-            return Ok(model.clone());
+    /// The body of a shape; `source` is the file that names the model.
+    pub(super) fn named(
+        &mut self,
+        source: &Path,
+        name: Option<&str>,
+        betas: &[f64],
+    ) -> Result<Arc<RestBody>, Error> {
+        let path = self.find(source, name)?;
+        if !self.loaded.contains_key(&path) {
+            self.loaded.insert(path.clone(), Model { body: body::load(&path)?, shapes: Vec::new() });
         }
-        let Some(name) = name else {
-            return Err(Error::invalid(listing, "model", "missing", "the file name of a body model"));
-        };
-        let places = ["models", "../models", "../../models"].map(|place| self.folder.join(place).join(name));
-        places.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
-            let expected = "a file in models/ of the subject's folder or of one of the two above it";
-            Error::invalid(listing, "model", format!("{name} not found"), expected)
-        })
-    }
-
-    fn shaped(&mut self, model: &Path, betas: &[f64]) -> Result<Arc<RestBody>, Error> {
-        if !self.models.contains_key(model) {
-            let loaded = Model { body: body::load(model)?, shapes: Vec::new() };
-            self.models.insert(model.to_owned(), loaded);
-        }
-        let Model { body, shapes } = self.models.get_mut(model).expect("inserted above");
+        let Model { body, shapes } = self.loaded.get_mut(&path).expect("inserted above");
         if let Some((_, rest)) = shapes.iter().find(|(known, _)| known == betas) {
             return Ok(rest.clone());
         }
-        let offsets = self.folder.join("gt_normal_offset.npy");
-        let mut rest = body.shaped(betas).map_err(|e| Error::scene(model, e))?;
+        let mut rest = body.shaped(betas).map_err(|e| Error::scene(source, e))?;
+        let offsets = self.subject.join("gt_normal_offset.npy");
         if self.options.clothing && offsets.is_file() {
             let array = npy::read(&offsets)?;
             let values: Vec<f32> = array.values.iter().map(|&v| v as f32).collect();
@@ -187,15 +229,25 @@ impl Loader<'_> {
         shapes.push((betas.to_vec(), rest.clone()));
         Ok(rest)
     }
-}
 
-fn or(preferred: PathBuf, fallback: &Path) -> PathBuf {
-    if preferred.is_file() { preferred } else { fallback.to_owned() }
+    /// A given model, or the named one in `models` of the subject's folder or of one of the two above it.
+    fn find(&self, source: &Path, name: Option<&str>) -> Result<PathBuf, Error> {
+        if let Some(model) = &self.options.model {
+            return Ok(model.clone());
+        }
+        let Some(name) = name else {
+            return Err(Error::invalid(source, "model", "missing", "a body model, named here or given"));
+        };
+        let places = ["models", "../models", "../../models"].map(|place| self.subject.join(place).join(name));
+        places.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
+            let expected = "a file in models/ of the subject's folder or of one of the two above it";
+            Error::invalid(source, "model", format!("{name} not found"), expected)
+        })
+    }
 }
 
 fn frames_of(
-    folder: &Path,
-    listing: &Path,
+    Files { folder, listing }: &Files,
     listed: Vec<ListedFrame>,
     poses: usize,
     cameras: usize,

@@ -7,12 +7,14 @@
 //! | module | formats |
 //! |---|---|
 //! | [`ply`] | 3DGS avatars, with their binding in extra properties |
-//! | [`body`] | SMPL-style `.npz`, skinned glTF 2.0 |
+//! | [`body`], [`gltf`] | SMPL-style `.npz`, skinned glTF 2.0 |
 //! | [`poses`] | SMPL-style `.npz` and JSON, glTF clips |
 //! | [`camera`] | camera JSON, `transforms.json`, `cameras.npz` |
 //! | [`frames`] | PNG, JPEG and `.npy` images and masks |
 //! | [`npy`], [`npz`] | NumPy arrays |
 //! | [`folder`] | a subject as a folder of sequences |
+//! | [`peoplesnapshot`] | PeopleSnapshot as prepared for InstantAvatar |
+//! | [`registry`] | `datasets.toml` |
 //! | [`sequence`] | posed frames with their cameras, decoded when asked for |
 
 pub mod atomic;
@@ -25,11 +27,14 @@ pub mod frames;
 pub mod gltf;
 pub mod npy;
 pub mod npz;
+pub mod peoplesnapshot;
 pub mod ply;
 pub mod poses;
 mod reduce;
+pub mod registry;
 pub mod sequence;
 
 pub use error::Error;
-pub use folder::Subject;
+pub use folder::{Capture, Subject};
+pub use registry::Registry;
 pub use sequence::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};

@@ -44,6 +44,14 @@ impl PoseTrack {
         self.len() == 0
     }
 
+    /// Number of joints or nodes that are posed.
+    pub fn num_joints(&self) -> usize {
+        match &self.keys {
+            Keys::AxisAngles { rotations, .. } => rotations.first().map_or(0, Vec::len),
+            Keys::Nodes { names, .. } => names.len(),
+        }
+    }
+
     /// The poses for a skeleton. Joints that the file does not mention (an SMPL body pose without hands) keep their
     /// rest transform.
     ///
@@ -52,7 +60,7 @@ impl PoseTrack {
     pub fn poses(&self, skeleton: &Skeleton) -> Result<Vec<Pose>, Error> {
         match &self.keys {
             Keys::AxisAngles { rotations, translations } => {
-                let joints = rotations.first().map_or(0, Vec::len);
+                let joints = self.num_joints();
                 if joints > skeleton.num_joints() {
                     let expected = format!("at most the body's {} joints", skeleton.num_joints());
                     return Err(Error::invalid(&self.path, "thetas", format!("{joints} joints"), expected));
