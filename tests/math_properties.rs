@@ -150,7 +150,7 @@ proptest! {
             let power = Solver::Power { steps, start: Start::Heaviest };
             let error = angle_between(solve(&bones, power).quat, exact.quat);
             // tan of the angle (in R⁴) shrinks by λ2/λ1 a step; the rotation's angle is twice that.
-            let tangent = (1.0 - along * along).max(0.0).sqrt() / along;
+            let tangent = (angle_between(start, exact.quat) / 2.0).tan();
             let bound = 2.0 * (tangent * ratio.powi(steps as i32)).atan();
             prop_assert!(error <= bound + 4.0 * tolerance(exact.gap) / along, "{steps}: {error:e} > {bound:e}");
         }
