@@ -1,5 +1,6 @@
 //! Scoring protocols: every choice behind a number, named and versioned, as data.
 
+use super::planes::floor;
 use super::{LpipsVariant, MetricsError, PsnrVariant, Region, SsimVariant};
 use crate::metrics::Aggregation;
 use serde::{Deserialize, Serialize};
@@ -215,26 +216,26 @@ fn value_of(text: &str) -> toml::Value {
 }
 
 impl Clamp {
-    /// The value after clamping.
+    /// Clamps values in place.
     #[inline(always)]
-    pub(crate) fn apply(self, value: f64) -> f64 {
+    pub(crate) fn apply(self, values: &mut [f64]) {
         match self {
-            Self::None => value,
-            Self::MaxOne => value.min(1.0),
-            Self::Unit => value.clamp(0.0, 1.0),
+            Self::None => (),
+            Self::MaxOne => values.iter_mut().for_each(|v| *v = v.min(1.0)),
+            Self::Unit => values.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0)),
         }
     }
 }
 
 impl Quantisation {
-    /// The value after the way to 8 bit and back.
+    /// Takes values to 8 bit and back in place.
     #[inline(always)]
-    pub(crate) fn apply(self, value: f64) -> f64 {
+    pub(crate) fn apply(self, values: &mut [f64]) {
         let offset = match self {
-            Self::None => return value,
+            Self::None => return,
             Self::Round8 => 0.5,
             Self::Trunc8 => 1e-9, // k / 255 * 255 may fall short of k by a rounding
         };
-        f64::from((value.clamp(0.0, 1.0) * 255.0 + offset) as i32) / 255.0
+        values.iter_mut().for_each(|v| *v = floor(v.clamp(0.0, 1.0) * 255.0 + offset) / 255.0);
     }
 }

@@ -132,14 +132,23 @@ impl Protocol {
             _ => None,
         };
         let outside = self.outside(truth.mask(), background)?;
-        let finish =
-            |i: usize, rgb: [f64; 3]| outside.apply(i, rgb.map(|v| self.quantise.apply(self.clamp.apply(v))));
-        let composite = |i: usize, rgb: [f64; 3]| match alpha {
-            None => rgb,
-            Some(alpha) => blend(rgb, background, exact_level(alpha[i])),
+        let width = render.width();
+        let finish = |y: usize, rgb: [&mut [f64]; 3]| {
+            for (c, values) in rgb.into_iter().enumerate() {
+                self.clamp.apply(values);
+                self.quantise.apply(values);
+                outside.apply(y * width, c, values);
+            }
         };
-        let render = Planes::mapped(render, "render", finish)?;
-        let rgb = Planes::mapped(rgb, "truth", |i, rgb| finish(i, composite(i, rgb)))?;
+        let render = Planes::by_rows(render, "render", finish)?;
+        let rgb = Planes::by_rows(rgb, "truth", |y, mut rgb| {
+            if let Some(alpha) = alpha {
+                for (values, background) in rgb.iter_mut().zip(background) {
+                    composite(values, &alpha[y * width..], background);
+                }
+            }
+            finish(y, rgb);
+        })?;
         self.cut(render, rgb, truth.mask())
     }
 
@@ -193,24 +202,32 @@ enum Outside<'a> {
 }
 
 impl Outside<'_> {
+    /// Changes values of channel `channel`, the first of which belongs to pixel `start`.
     #[inline(always)]
-    fn apply(&self, i: usize, rgb: [f64; 3]) -> [f64; 3] {
+    fn apply(&self, start: usize, channel: usize, values: &mut [f64]) {
         match *self {
-            Self::Kept => rgb,
-            Self::Scaled { mask } => rgb.map(|v| v * exact_level(mask[i])),
+            Self::Kept => (),
+            Self::Scaled { mask } => {
+                for (value, &mask) in values.iter_mut().zip(&mask[start..]) {
+                    *value *= exact_level(mask);
+                }
+            }
             Self::Filled { mask, threshold, colour } => {
-                if mask[i] >= threshold {
-                    rgb
-                } else {
-                    colour
+                for (value, &mask) in values.iter_mut().zip(&mask[start..]) {
+                    *value = if mask >= threshold { *value } else { colour[channel] };
                 }
             }
         }
     }
 }
 
-fn blend(rgb: [f64; 3], background: [f64; 3], alpha: f64) -> [f64; 3] {
-    std::array::from_fn(|c| rgb[c] * alpha + background[c] * (1.0 - alpha))
+/// `v a + background (1 - a)`.
+#[inline(always)]
+fn composite(values: &mut [f64], alpha: &[f32], background: f64) {
+    for (value, &alpha) in values.iter_mut().zip(alpha) {
+        let alpha = exact_level(alpha);
+        *value = *value * alpha + background * (1.0 - alpha);
+    }
 }
 
 /// +inf as `null`.

@@ -37,6 +37,24 @@ pub(super) struct Scratch {
     means: [Vec<f64>; 4],
 }
 
+/// The work of [`Tile::sum`], compiled once per instruction set. (A closure would not be: it is not inlined.)
+struct Sum<'a, 'b> {
+    tile: &'a Tile<'b>,
+    window: &'a Window,
+    constants: &'a Constants,
+    weights: Option<&'a [f64]>,
+    scratch: &'a mut Scratch,
+}
+
+impl pulp::WithSimd for Sum<'_, '_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> f64 {
+        self.tile.sum_rows(self.window, self.constants, self.weights, self.scratch)
+    }
+}
+
 impl Tile<'_> {
     /// Σ of the map over the rectangle, each pixel times its weight if there are weights (for the whole image,
     /// row-major). With [`Border::Valid`] all windows must fit into the image.
@@ -47,10 +65,7 @@ impl Tile<'_> {
         weights: Option<&[f64]>,
         scratch: &mut Scratch,
     ) -> f64 {
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || self.sum_rows(window, constants, weights, scratch),
-        )
+        pulp::Arch::new().dispatch(Sum { tile: self, window, constants, weights, scratch })
     }
 
     #[inline(always)]
@@ -152,22 +167,26 @@ impl Scratch {
 /// the length of `out` is a multiple of [`LANES`].
 #[inline(always)]
 fn filter(out: &mut [f64], taps: &[f64], from: &[f64], centre: usize, step: usize, add: bool) {
-    for (chunk, out) in out.chunks_exact_mut(LANES).enumerate() {
+    for (chunk, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
         let centre = centre + chunk * LANES;
-        let middle = &from[centre..][..LANES];
-        let mut sums: [f64; LANES] = if add { std::array::from_fn(|i| out[i]) } else { [0.0; LANES] };
+        let mut sums = if add { *out } else { [0.0; LANES] };
+        let middle = lanes(from, centre);
         for i in 0..LANES {
             sums[i] += taps[0] * middle[i];
         }
         for (k, &tap) in taps.iter().enumerate().skip(1) {
-            let before = &from[centre - k * step..][..LANES];
-            let after = &from[centre + k * step..][..LANES];
+            let (before, after) = (lanes(from, centre - k * step), lanes(from, centre + k * step));
             for i in 0..LANES {
                 sums[i] += tap * (before[i] + after[i]);
             }
         }
-        out.copy_from_slice(&sums);
+        *out = sums;
     }
+}
+
+#[inline(always)]
+fn lanes(from: &[f64], start: usize) -> &[f64; LANES] {
+    from[start..].first_chunk().expect("rows are padded to whole chunks")
 }
 
 #[inline(always)]
