@@ -1,8 +1,9 @@
 //! The inner loops: the sum of the SSIM map over a tile of one channel.
 //!
 //! Only four moments are needed, because the index reads the variances as their sum: a, b, a² + b², ab. Each row is
-//! filtered vertically, then horizontally, in chunks of [`LANES`] that the compiler turns into vector instructions of
-//! the machine it runs on; multiplications and additions stay apart, so that all machines agree to the last bit.
+//! filtered vertically, then horizontally, one tap at a time over whole rows, which the compiler turns into vector
+//! instructions of the machine it runs on; multiplications and additions stay apart, so that all machines agree to the
+//! last bit.
 
 use super::Border;
 use super::window::Window;
@@ -35,6 +36,8 @@ pub(super) struct Scratch {
     columns: [Vec<f64>; 4],
     /// One row of each moment after both.
     means: [Vec<f64>; 4],
+    /// One row of the map.
+    index: Vec<f64>,
 }
 
 /// The work of [`Tile::sum`], compiled once per instruction set. (A closure would not be: it is not inlined.)
@@ -82,13 +85,14 @@ impl Tile<'_> {
         let mut sum = 0.0;
         for y in self.rect.y.clone() {
             scratch.filter_row(window, y - self.rect.y.start, columns, stride);
-            let map = |x: usize| ssim_at(scratch.means.each_ref().map(|m| m[x]), constants);
+            scratch.index_row(constants);
             let n = self.rect.x.len();
+            let index = &scratch.index[..n];
             sum += match weights {
-                None => lane_sum(n, map),
+                None => lane_sum([index], |[index]| index),
                 Some(weights) => {
                     let weights = &weights[y * self.width + self.rect.x.start..][..n];
-                    lane_sum(n, |x| weights[x] * map(x))
+                    lane_sum([index, weights], |[index, weight]| weight * index)
                 }
             };
         }
@@ -161,32 +165,44 @@ impl Scratch {
             }
         }
     }
-}
 
-/// `out[x] (+)= taps[0] * from[centre + x] + Σ_k taps[k] * (from[centre + x - k step] + from[centre + x + k step])`;
-/// the length of `out` is a multiple of [`LANES`].
-#[inline(always)]
-fn filter(out: &mut [f64], taps: &[f64], from: &[f64], centre: usize, step: usize, add: bool) {
-    for (chunk, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-        let centre = centre + chunk * LANES;
-        let mut sums = if add { *out } else { [0.0; LANES] };
-        let middle = lanes(from, centre);
-        for i in 0..LANES {
-            sums[i] += taps[0] * middle[i];
+    /// Turns the row of `means` into a row of the map.
+    #[inline(always)]
+    fn index_row(&mut self, constants: &Constants) {
+        let [a, b, squares, product] = &self.means;
+        self.index.resize(a.len(), 0.0);
+        let means = a.iter().zip(b).zip(squares.iter().zip(product));
+        for (index, ((a, b), (squares, product))) in self.index.iter_mut().zip(means) {
+            *index = ssim_at([*a, *b, *squares, *product], constants);
         }
-        for (k, &tap) in taps.iter().enumerate().skip(1) {
-            let (before, after) = (lanes(from, centre - k * step), lanes(from, centre + k * step));
-            for i in 0..LANES {
-                sums[i] += tap * (before[i] + after[i]);
-            }
-        }
-        *out = sums;
     }
 }
 
+/// `out[x] (+)= taps[0] * from[centre + x] + Σ_k taps[k] * (from[centre + x - k step] + from[centre + x + k step])`.
 #[inline(always)]
-fn lanes(from: &[f64], start: usize) -> &[f64; LANES] {
-    from[start..].first_chunk().expect("rows are padded to whole chunks")
+fn filter(out: &mut [f64], taps: &[f64], from: &[f64], centre: usize, step: usize, add: bool) {
+    let n = out.len();
+    let middle = &from[centre..][..n];
+    for (out, middle) in out.iter_mut().zip(middle) {
+        *out = taps[0] * middle + if add { *out } else { 0.0 };
+    }
+    let sides = |k: usize| (&from[centre - k * step..][..n], &from[centre + k * step..][..n]);
+    let mut k = 1;
+    // Two distances per sweep, to load and store `out` half as often.
+    while k + 1 < taps.len() {
+        let ((near_before, near_after), (far_before, far_after)) = (sides(k), sides(k + 1));
+        for i in 0..n {
+            let near = taps[k] * (near_before[i] + near_after[i]);
+            out[i] += near + taps[k + 1] * (far_before[i] + far_after[i]);
+        }
+        k += 2;
+    }
+    if k < taps.len() {
+        let (before, after) = sides(k);
+        for i in 0..n {
+            out[i] += taps[k] * (before[i] + after[i]);
+        }
+    }
 }
 
 #[inline(always)]
