@@ -1,7 +1,7 @@
 //! Protocols and strategies by their specs: the one place where experiments meet the layers that define them.
 
 use crate::metrics::{MetricsError, Protocol};
-use serde_json::Value;
+use crate::strategy::{Strategy, StrategyError};
 
 /// The protocol of a spec.
 ///
@@ -14,10 +14,14 @@ pub(super) fn protocol(spec: &str) -> Result<Protocol, (String, String)> {
     })
 }
 
-/// The strategy of a spec, in full.
+/// The strategy of a spec.
 ///
 /// # Errors
 /// What is wrong with the spec, and what is known.
-pub(super) fn strategy(spec: &str) -> Result<Value, (String, String)> {
-    Ok(Value::String(spec.to_owned()))
+pub(super) fn strategy(spec: &str) -> Result<Strategy, (String, String)> {
+    spec.parse().map_err(|error| match error {
+        StrategyError::UnknownId { axis, id, expected } => (format!("unknown {axis} `{id}`"), expected),
+        StrategyError::BadVariation { part, expected } => (format!("`{part}`"), expected),
+        other => (format!("`{spec}`: {other}"), "a valid strategy".to_owned()),
+    })
 }

@@ -6,6 +6,7 @@ use super::{
     Variant, catalog, content_key,
 };
 use crate::metrics::{Protocol, ProtocolId};
+use crate::strategy::Strategy;
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -201,8 +202,8 @@ impl Builder<'_> {
             Error::invalid(&experiment.id, format!("variants[{index}].{field}"), problem, expected)
         };
         let strategy = match &variant.strategy {
-            None => serde_json::Value::Null,
-            Some(spec) => catalog::strategy(spec).map_err(|why| invalid("strategy", why))?,
+            None => None,
+            Some(spec) => Some(catalog::strategy(spec).map_err(|why| invalid("strategy", why))?),
         };
         let avatar = self.avatar(variant, row).map_err(|why| invalid("avatar", why))?;
         Ok(Prepared { variant: variant.clone(), avatar, strategy })
@@ -307,7 +308,7 @@ struct Prepared {
     /// Key of the avatar.
     avatar: String,
     /// The strategy in full, so that two specs of one strategy share their keys.
-    strategy: serde_json::Value,
+    strategy: Option<Strategy>,
 }
 
 fn find_sequence<'a>(subject: &'a SubjectInfo, id: &str) -> &'a SequenceInfo {

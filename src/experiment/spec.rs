@@ -1,11 +1,12 @@
 //! The experiment file: one table, described as data.
 
-use super::{Capture, EMBEDDED, Error, Paper, Source, Split, validate};
+use super::{Capture, EMBEDDED, Error, Paper, Source, Split, catalog, validate};
 use crate::metrics::MetricKind;
+use crate::strategy::PRESETS;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// How the ids of variants begin that [`Experiment::with_strategies`] adds.
+/// How the ids of variants begin that [`Experiment::with_all_strategies`] adds.
 pub const ADDED_VARIANT: &str = "strategy-";
 
 /// One table: what to ask of which data. See `experiments/README.md` for the file format.
@@ -241,25 +242,26 @@ impl Experiment {
         if source == Source::StandIn { other.unwrap_or(&self.protocol) } else { &self.protocol }
     }
 
-    /// The experiment with a further row for each of the given strategies `(id, title)` that no variant has yet. The
-    /// rows copy the avatar of the last variant that a strategy poses; without such a variant nothing is added.
-    pub fn with_strategies<'a>(&self, strategies: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
+    /// The experiment with a further row for each preset strategy that no variant has yet. The rows copy the avatar of
+    /// the last variant that a strategy poses; without such a variant nothing is added.
+    pub fn with_all_strategies(&self) -> Self {
         let mut extended = self.clone();
         let Some(model) = self.variants.iter().rev().find(|variant| variant.strategy.is_some()) else {
             return extended;
         };
-        for (id, title) in strategies {
+        for preset in PRESETS {
             let known = |v: &Variant| {
-                v.strategy.as_deref() == Some(id)
+                let strategy = v.strategy.as_deref().and_then(|spec| catalog::strategy(spec).ok());
+                strategy == Some(preset.strategy)
                     && v.avatar == model.avatar
                     && v.sh_degree == model.sh_degree
             };
             if !extended.variants.iter().any(known) {
                 extended.variants.push(Variant {
-                    id: format!("{ADDED_VARIANT}{id}"),
-                    label: title.to_owned(),
+                    id: format!("{ADDED_VARIANT}{}", preset.id),
+                    label: preset.title.to_owned(),
                     paper: None,
-                    strategy: Some(id.to_owned()),
+                    strategy: Some(preset.id.to_owned()),
                     ..model.clone()
                 });
             }

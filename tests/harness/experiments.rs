@@ -5,6 +5,7 @@ use super::support;
 use skinsplat::experiment::{AvatarRecipe, Capture, Experiment, Layout, Paper, Role, Source, plan};
 use skinsplat::metrics::MetricKind;
 use skinsplat::report;
+use skinsplat::strategy::PRESETS;
 use std::path::Path;
 
 fn transcription() -> toml::Table {
@@ -148,18 +149,24 @@ fn the_tables_ask_what_the_paper_asks() {
 
 #[test]
 fn all_strategies_add_a_row_each_and_nothing_twice() {
-    let strategies = [("lbs", "LBS"), ("quaternion-average", "Quaternion average"), ("face-tbn", "Face TBN")];
-    let extended = table_7().with_strategies(strategies);
-    let labels: Vec<&str> = extended.variants.iter().map(|variant| variant.label.as_str()).collect();
-    assert_eq!(labels, ["Matrices", "Quaternions", "Face TBN"]);
+    let extended = table_7().with_all_strategies();
+    let mut strategies: Vec<&str> =
+        extended.variants.iter().map(|v| v.strategy.as_deref().unwrap()).collect();
+    assert_eq!(strategies[..2], ["lbs", "quaternion-average"]);
+    strategies.sort_unstable();
+    let mut presets: Vec<&str> = PRESETS.iter().map(|preset| preset.id).collect();
+    presets.sort_unstable();
+    assert_eq!(strategies, presets);
     let added = &extended.variants[2];
-    assert_eq!(
-        (added.id.as_str(), added.sh_degree, added.paper.as_deref()),
-        ("strategy-face-tbn", Some(1), None)
-    );
-    assert_eq!(extended.with_strategies(strategies), extended);
-    let mesh = &Experiment::embedded()[5];
-    assert_eq!(mesh.with_strategies([("lbs", "LBS")]).variants[2].avatar, AvatarRecipe::SurfaceVertex {});
+    assert_eq!((added.id.as_str(), added.label.as_str()), ("strategy-face-tbn", "Face TBN"));
+    assert_eq!((added.sh_degree, added.paper.as_deref()), (Some(1), None));
+    assert_eq!(extended.with_all_strategies(), extended);
+    let mesh = Experiment::embedded()[5].with_all_strategies();
+    assert_eq!(mesh.variants[2].avatar, AvatarRecipe::SurfaceVertex {});
+    for experiment in Experiment::embedded() {
+        let text = toml::to_string(&experiment.with_all_strategies()).unwrap();
+        Experiment::parse(&text, &format!("{}.toml", experiment.id)).unwrap();
+    }
 }
 
 /// A table that no code knows, on data that no code knows: from its file to its rows.
@@ -209,6 +216,16 @@ fn wrong_files_are_refused_by_name_and_key() {
         ("id = \"table7\"", "id = \"\"", "id: ``"),
         ("protocol = \"avatar-v1\"", "protocol = \"nonsense\"", "protocol: `nonsense`: no preset"),
         ("strategy = \"lbs\"", "", "variants[0].strategy: missing"),
+        (
+            "strategy = \"lbs\"",
+            "strategy = \"lbz\"",
+            "variants[0].strategy: unknown strategy `lbz`; expected lbs,",
+        ),
+        (
+            "strategy = \"lbs\"",
+            "strategy = \"lbs+hue=red\"",
+            "variants[0].strategy: `hue=red`; expected one of the axes",
+        ),
         ("sh_degree = 1", "sh_degree = 4", "variants[0].sh_degree: 4; expected 0 to 3"),
         ("sh_degree = 1", "", "variants[0].sh_degree: missing"),
         (

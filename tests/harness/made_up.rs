@@ -7,34 +7,34 @@ use skinsplat::experiment::{
 use skinsplat::metrics::{FrameScore, Protocol};
 
 /// A seventh table: not one of the paper's, on a data set that no code knows.
-pub const TABLE_7: &str = include_str!("table7.toml");
+pub(super) const TABLE_7: &str = include_str!("table7.toml");
 
-pub fn table_7() -> Experiment {
+pub(super) fn table_7() -> Experiment {
     Experiment::parse(TABLE_7, "table7.toml").unwrap()
 }
 
 /// The seventh table in the wide layout.
-pub fn wide_table_7() -> Experiment {
+pub(super) fn wide_table_7() -> Experiment {
     let text = TABLE_7.replace("layout = \"rows\"", "layout = \"wide\"").replace("\"Mean\"", "\"All\"");
     Experiment::parse(&text, "table7.toml").unwrap()
 }
 
-pub fn options() -> Options {
+pub(super) fn options() -> Options {
     Options { profile: Profile::standard(), subset: Subset::default() }
 }
 
-pub fn sequence(id: &str, role: Role, frames: usize) -> SequenceInfo {
+pub(super) fn sequence(id: &str, role: Role, frames: usize) -> SequenceInfo {
     let frame = |time| FrameInfo { name: format!("image_{time:04}"), time, camera: 0 };
     let digest = format!("digest of {id}");
     SequenceInfo { id: id.into(), role, digest, frames: (0..frames).map(frame).collect() }
 }
 
-pub fn subject(id: &str, capture: Capture, sequences: Vec<SequenceInfo>) -> SubjectInfo {
+pub(super) fn subject(id: &str, capture: Capture, sequences: Vec<SequenceInfo>) -> SubjectInfo {
     SubjectInfo { id: id.into(), capture, sequences, avatars: Vec::new() }
 }
 
 /// The seventh table's own data: subjects `anna` and `bob`.
-pub fn own_data(test_frames: usize) -> Dataset {
+pub(super) fn own_data(test_frames: usize) -> Dataset {
     let person = |id: &str| {
         let train = sequence(&format!("{id}-train"), Role::Train, 20);
         let test = sequence(&format!("{id}-test"), Role::Test, test_frames);
@@ -46,7 +46,7 @@ pub fn own_data(test_frames: usize) -> Dataset {
 }
 
 /// Data that may stand in: one subject of each kind of capture.
-pub fn figures() -> Dataset {
+pub(super) fn figures() -> Dataset {
     let figure = |id: &str, capture| {
         let train = sequence(&format!("{id}-train"), Role::Train, 8);
         let tests = [
@@ -63,7 +63,7 @@ pub fn figures() -> Dataset {
     Dataset { id: "figures".into(), title: "Figures".into(), subjects }
 }
 
-pub fn score(protocol: &str, psnr: f64, ssim: f64, lpips: Option<f64>) -> FrameScore {
+pub(super) fn score(protocol: &str, psnr: f64, ssim: f64, lpips: Option<f64>) -> FrameScore {
     let mse = 10_f64.powf(-psnr / 10.0);
     FrameScore {
         protocol: Protocol::parse(protocol).unwrap().key(),
@@ -76,16 +76,16 @@ pub fn score(protocol: &str, psnr: f64, ssim: f64, lpips: Option<f64>) -> FrameS
     }
 }
 
-pub fn record(key: &str, outcome: Outcome) -> FrameRecord {
+pub(super) fn record(key: &str, outcome: Outcome) -> FrameRecord {
     FrameRecord { key: key.into(), label: format!("label of {key}"), outcome, seconds: Seconds::default() }
 }
 
-pub fn scored(key: &str, score: FrameScore) -> FrameRecord {
+pub(super) fn scored(key: &str, score: FrameScore) -> FrameRecord {
     record(key, Outcome::Scored { score, splats: Some(100), visible_splats: Some(90) })
 }
 
 /// A score for everything in the plan: frame k of variant v in row r has PSNR `20 + r + v / 2 + k / 10`.
-pub fn run(plan: &Plan) -> Records {
+pub(super) fn run(plan: &Plan) -> Records {
     let mut records = Records::new();
     for job in &plan.jobs {
         for variant in &job.variants {

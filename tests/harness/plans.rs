@@ -1,1 +1,253 @@
-//! (in construction)
+//! Plans: pure, paired, keyed by everything that numbers depend on.
+
+use super::made_up::{figures, options, own_data, sequence, subject, table_7};
+use skinsplat::experiment::{
+    AvatarRecipe, Capture, Dataset, Experiment, Options, Plan, Profile, Role, Shard, Source, Subset,
+    canonical_json, plan,
+};
+use std::collections::BTreeSet;
+
+fn planned(experiments: &[Experiment], datasets: &[Dataset]) -> Plan {
+    plan(experiments, datasets, &options()).unwrap()
+}
+
+fn keys(plan: &Plan) -> Vec<&str> {
+    plan.jobs.iter().flat_map(|job| &job.variants).map(|variant| variant.key.as_str()).collect()
+}
+
+#[test]
+fn a_plan_depends_on_its_arguments_alone() {
+    let experiments = Experiment::embedded();
+    let (first, again) = (planned(&experiments, &[figures()]), planned(&experiments, &[figures()]));
+    assert_eq!(first, again);
+    assert_eq!(canonical_json(&first), canonical_json(&again));
+    let renamed = Dataset { title: "Others".into(), ..figures() };
+    assert_eq!(keys(&first), keys(&planned(&experiments, &[renamed])));
+}
+
+#[test]
+fn own_data_wins_over_stand_ins_and_frames_are_in_order() {
+    let plan = planned(&[table_7()], &[figures(), own_data(3)]);
+    let table = &plan.tables[0];
+    assert_eq!(table.source, Source::Own);
+    assert_eq!(table.datasets, [("gymnasts".to_owned(), "Gymnasts".to_owned())]);
+    let labels: Vec<&str> = table.rows.iter().map(|row| row.label.as_str()).collect();
+    assert_eq!(labels, ["anna", "bob"]);
+    let frames: Vec<(usize, &str)> = plan.jobs.iter().map(|job| (job.row, job.name.as_str())).collect();
+    let names = ["image_0000", "image_0001", "image_0002"];
+    let expected: Vec<(usize, &str)> = (0..2).flat_map(|row| names.map(|name| (row, name))).collect();
+    assert_eq!(frames, expected);
+    assert!(plan.jobs.iter().all(|job| job.variants.len() == 2 && job.protocol == "avatar-v1"));
+}
+
+#[test]
+fn stand_ins_are_of_the_right_kind_and_all_of_their_test_sequences_run() {
+    let plan = planned(&Experiment::embedded(), &[figures()]);
+    for (table, who) in plan.tables.iter().zip(["mono", "mono", "mono", "multi", "mono", "hands"]) {
+        assert_eq!(table.source, Source::StandIn);
+        let labels: Vec<&str> = table.rows.iter().map(|row| row.label.as_str()).collect();
+        assert_eq!(labels, [format!("{who} / {who}-twist"), format!("{who} / {who}-squat")]);
+    }
+    assert_eq!(plan.tables[3].protocol.id, "animatable-gala+background=[1.0, 1.0, 1.0]");
+    let two =
+        planned(&Experiment::embedded()[..1], &[figures(), Dataset { id: "dolls".into(), ..figures() }]);
+    let labels: Vec<&str> = two.tables[0].rows.iter().map(|row| row.label.as_str()).collect();
+    assert_eq!(labels[0], "figures: mono / mono-twist");
+    assert_eq!(labels[2], "dolls: mono / mono-twist");
+    let none = planned(&Experiment::embedded()[..1], &[]);
+    assert_eq!((none.tables[0].source, none.jobs.len()), (Source::Absent, 0));
+}
+
+#[test]
+fn avatars_are_shared_by_tables_that_make_the_same_ones() {
+    let plan = planned(&Experiment::embedded(), &[figures()]);
+    let made: Vec<(&str, &str, Option<u8>)> = plan
+        .avatars
+        .iter()
+        .map(|avatar| {
+            let recipe = match avatar.recipe {
+                AvatarRecipe::SurfaceVertex {} => "vertex",
+                AvatarRecipe::SurfaceFace { .. } => "face",
+                AvatarRecipe::TexturedMesh { .. } => "mesh",
+                AvatarRecipe::File { .. } => "file",
+            };
+            (avatar.subject.as_str(), recipe, avatar.sh_degree)
+        })
+        .collect();
+    assert_eq!(
+        made,
+        [
+            ("mono", "vertex", Some(3)),
+            ("mono", "face", Some(2)), // tables 2 and 3
+            ("mono", "face", Some(0)),
+            ("multi", "vertex", Some(2)),
+            ("mono", "vertex", Some(2)),
+            ("hands", "mesh", None),
+            ("hands", "vertex", Some(3)),
+        ]
+    );
+    let known: BTreeSet<&str> = plan.avatars.iter().map(|avatar| avatar.key.as_str()).collect();
+    assert!(plan.jobs.iter().flat_map(|job| &job.variants).all(|v| known.contains(v.avatar.as_str())));
+}
+
+/// Everything that a number depends on moves its key, and nothing else does.
+#[test]
+fn keys_follow_what_numbers_depend_on() {
+    let base = planned(&[table_7()], &[own_data(3)]);
+    let with = |change: &dyn Fn(&mut Experiment)| {
+        let mut experiment = table_7();
+        change(&mut experiment);
+        planned(&[experiment], &[own_data(3)])
+    };
+    let first = |plan: &Plan| plan.jobs[0].variants[0].key.clone();
+    let depends: [(&str, &dyn Fn(&mut Experiment)); 6] = [
+        ("protocol", &|e| e.protocol = "haha".into()),
+        ("protocol choice", &|e| e.protocol = "avatar-v1+ssim=uniform7".into()),
+        ("strategy", &|e| e.variants[0].strategy = Some("face-tbn".into())),
+        ("SH degree", &|e| e.variants[0].sh_degree = Some(2)),
+        ("recipe", &|e| e.variants[0].avatar = AvatarRecipe::SurfaceFace { per_face: 2 }),
+        ("antialiasing", &|e| e.antialiased = true),
+    ];
+    let mut seen = BTreeSet::from([first(&base)]);
+    for (what, change) in depends {
+        assert!(seen.insert(first(&with(change))), "{what}");
+    }
+    let free: [(&str, &dyn Fn(&mut Experiment)); 4] = [
+        ("id", &|e| e.id = "other".into()),
+        ("captions", &|e| e.caption = "Other".into()),
+        ("label", &|e| e.variants[0].label = "Other".into()),
+        ("another spec of the same strategy", &|e| {
+            e.variants[0].strategy = Some("lbs+rotation=gram-schmidt-columns".into());
+        }),
+    ];
+    for (what, change) in free {
+        assert_eq!(first(&with(change)), first(&base), "{what}");
+    }
+    let mut data = own_data(3);
+    data.subjects[0].sequences[0].digest += "!";
+    assert_ne!(first(&planned(&[table_7()], &[data])), first(&base), "training data");
+    let mut data = own_data(3);
+    data.subjects[0].sequences[1].digest += "!";
+    let moved = planned(&[table_7()], &[data]);
+    assert_ne!(first(&moved), first(&base), "test data");
+    assert_eq!(keys(&moved)[6..], keys(&base)[6..], "the other subject's");
+    let quick = Options { profile: Profile::quick(), ..options() };
+    assert_ne!(first(&plan(&[table_7()], &[own_data(3)], &quick).unwrap()), first(&base), "resolution");
+    assert_eq!(keys(&base).iter().collect::<BTreeSet<_>>().len(), 12);
+}
+
+#[test]
+fn a_subset_keeps_the_keys_of_what_is_left_and_is_recorded() {
+    let all = planned(&[table_7()], &[own_data(10)]);
+    let subset = Subset {
+        frames: Some([2, 8]),
+        limit: Some(3),
+        subjects: vec!["bob".into()],
+        variants: vec!["quaternions".into()],
+    };
+    let part = plan(&[table_7()], &[own_data(10)], &Options { subset, ..options() }).unwrap();
+    assert!(part.is_partial() && !all.is_partial());
+    assert_ne!(part.digest, all.digest);
+    let frames: Vec<usize> = part.jobs.iter().map(|job| job.frame).collect();
+    assert_eq!(frames, [2, 3, 4]);
+    let known: BTreeSet<&str> = keys(&all).into_iter().collect();
+    assert!(keys(&part).iter().all(|key| known.contains(key)));
+    for (subset, message) in [
+        (
+            Subset { subjects: vec!["eve".into()], ..Subset::default() },
+            "subjects: `eve`; expected one of anna, bob",
+        ),
+        (
+            Subset { variants: vec!["x".into()], ..Subset::default() },
+            "variants: `x`; expected one of matrices, qua",
+        ),
+    ] {
+        let error =
+            plan(&[table_7()], &[own_data(3)], &Options { subset, ..options() }).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
+}
+
+#[test]
+fn profiles_thin_frames_evenly() {
+    let profile = Profile { max_train_frames: Some(4), max_test_frames: Some(2), ..Profile::standard() };
+    let plan = plan(&[table_7()], &[own_data(10)], &Options { profile, ..options() }).unwrap();
+    let frames: Vec<usize> = plan.jobs.iter().map(|job| job.frame).collect();
+    assert_eq!(frames, [2, 7, 2, 7]);
+    assert_eq!(plan.avatars[0].frames, [2, 7, 12, 17]);
+    assert_eq!(plan.avatars[0].sequence.as_deref(), Some("anna-train"));
+}
+
+/// One sequence that an experiment splits by frame number and camera, as PeopleSnapshot and GalaBasketball are.
+#[test]
+fn splits_cut_whole_sequences() {
+    let experiments = Experiment::embedded();
+    let mut whole = sequence("male-3", Role::Whole, 676);
+    let person = subject("male-3", Capture::Monocular, vec![whole.clone()]);
+    let data =
+        Dataset { id: "peoplesnapshot".into(), title: "PeopleSnapshot".into(), subjects: vec![person] };
+    let plan = planned(&experiments[1..2], &[data]);
+    assert_eq!((plan.jobs.len(), plan.avatars[0].frames.len()), (55, 19));
+    assert_eq!((plan.jobs[0].frame, plan.jobs[54].frame), (456, 672));
+    let missing: Vec<&str> =
+        plan.tables[0].rows[1..].iter().map(|row| row.missing.as_deref().unwrap()).collect();
+    assert_eq!(missing[0], "the data set has no subject `female-3`");
+
+    whole.id = "dribble".into();
+    whole.frames = (0..7)
+        .flat_map(|camera| {
+            sequence("", Role::Whole, 60).frames.into_iter().map(move |mut frame| {
+                frame.camera = camera;
+                frame
+            })
+        })
+        .collect();
+    let ball = subject("dribble", Capture::Multiview, vec![whole]);
+    let data = Dataset { id: "galabasketball".into(), title: "GalaBasketball".into(), subjects: vec![ball] };
+    let plan = planned(&experiments[3..4], &[data]);
+    assert_eq!((plan.jobs.len(), plan.avatars[0].frames.len()), (30, 180));
+    assert_eq!(plan.jobs[0].frame, 6 * 60);
+    assert_eq!(plan.tables[0].protocol.id, "animatable-gala");
+
+    let takes = ["train/Take4", "train/Take6", "train/Take8"].map(|id| sequence(id, Role::Train, 5));
+    let hands = subject("00016", Capture::Hands, takes.to_vec());
+    let data = Dataset { id: "xhumans".into(), title: "X-Humans".into(), subjects: vec![hands] };
+    let plan = planned(&experiments[5..], &[data]);
+    assert_eq!(plan.tables[0].rows[0].sequence, "train/Take6");
+    assert_eq!(plan.avatars[0].sequence.as_deref(), Some("train/Take4"));
+}
+
+#[test]
+fn fitted_avatars_come_by_name() {
+    let mut experiment = table_7();
+    experiment.variants[0].avatar = AvatarRecipe::File { name: "fitted".into() };
+    experiment.variants[0].sh_degree = None;
+    let plan = planned(&[experiment.clone()], &[own_data(2)]);
+    assert_eq!((plan.avatars[0].sequence.as_deref(), plan.avatars[0].frames.len()), (None, 0));
+    experiment.variants[0].avatar = AvatarRecipe::File { name: "other".into() };
+    let error =
+        skinsplat::experiment::plan(&[experiment], &[own_data(2)], &options()).unwrap_err().to_string();
+    assert!(
+        error.contains(
+            "variants[0].avatar: gymnasts/anna has no avatar `other`; expected one of those it has: fitted"
+        ),
+        "{error}"
+    );
+    let mut data = own_data(2);
+    data.subjects[1].sequences.remove(0);
+    let error = skinsplat::experiment::plan(&[table_7()], &[data], &options()).unwrap_err().to_string();
+    assert!(error.contains("gymnasts/bob has no training sequence"), "{error}");
+}
+
+#[test]
+fn shards_of_a_plan_are_its_jobs() {
+    let plan = planned(&Experiment::embedded(), &[figures()]);
+    let mut positions = Vec::new();
+    for index in 1..=3 {
+        let jobs = plan.shard(Some(Shard::new(index, 3).unwrap()));
+        positions.extend(jobs.iter().map(|job| plan.jobs.iter().position(|other| other == *job).unwrap()));
+    }
+    positions.sort_unstable();
+    assert_eq!(positions, (0..plan.jobs.len()).collect::<Vec<_>>());
+    assert_eq!(plan.shard(None).len(), plan.jobs.len());
+}
