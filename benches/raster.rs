@@ -1,22 +1,30 @@
 //! temp
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason="temp")]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason = "temp")]
 #[path = "../tests/support/splat_scene.rs"]
 mod splat_scene;
 use skinsplat::render::splat::*;
 use skinsplat::scene::*;
 use std::time::Instant;
 fn main() {
-    let cams: serde_json::Value = serde_json::from_slice(&std::fs::read("target/scenes/cameras.json").unwrap()).unwrap();
-    let level = match std::env::var("LEVEL").as_deref() { Ok("avx2") => SimdLevel::Avx2, _ => SimdLevel::Avx512 };
+    let cams: serde_json::Value =
+        serde_json::from_slice(&std::fs::read("target/scenes/cameras.json").unwrap()).unwrap();
+    let level = match std::env::var("LEVEL").as_deref() {
+        Ok("avx2") => SimdLevel::Avx2,
+        _ => SimdLevel::Avx512,
+    };
     let only = std::env::var("ONLY").unwrap_or_default();
     let reps: usize = std::env::var("REPS").ok().map_or(60, |v| v.parse().unwrap());
     for scene in ["S", "M", "L"] {
-        if !only.is_empty() && !only.starts_with(scene) { continue }
+        if !only.is_empty() && !only.starts_with(scene) {
+            continue;
+        }
         let g = splat_scene::gaussians(format!("target/scenes/scene_{scene}.ply").as_ref());
         let posed = Posed::from_static(&g);
         for cam in cams["cameras"].as_array().unwrap() {
             let name = cam["name"].as_str().unwrap();
-            if !only.is_empty() && !format!("{scene} {name}").starts_with(&only) { continue }
+            if !only.is_empty() && !format!("{scene} {name}").starts_with(&only) {
+                continue;
+            }
             let (camera, background) = splat_scene::camera(cam);
             let settings = RenderSettings { background, antialiased: false };
             for threads in [1, 2] {

@@ -111,13 +111,8 @@ fn alpha<L: Lanes>(l: L, paint: &Paint, x: L::F, y: L::F) -> L::F {
 #[inline(always)]
 fn exp2_negated<L: Lanes>(l: L, q: L::F) -> L::F {
     // Minimax in relative error for 2^f, |f| <= 1/2, with 2^0 = 1 exactly.
-    const POLYNOMIAL: [f32; 5] = [
-        0.001_326_472_7,
-        0.009_671_512_7,
-        0.055_507_337_4,
-        0.240_222_420_8,
-        0.693_146_977_6,
-    ];
+    const POLYNOMIAL: [f32; 5] =
+        [0.001_326_472_7, 0.009_671_512_7, 0.055_507_337_4, 0.240_222_420_8, 0.693_146_977_6];
     let n = l.round(q);
     let f = l.sub(n, q);
     let mut p = l.splat(POLYNOMIAL[0]);
@@ -126,4 +121,10 @@ fn exp2_negated<L: Lanes>(l: L, q: L::F) -> L::F {
     }
     p = l.mul_add(p, f, l.splat(1.0));
     l.divide_by_power_of_two(p, n)
+}
+
+/// The alpha of a splat at one pixel.
+#[cfg(test)]
+pub(super) fn alpha_at(paint: &Paint, x: f32, y: f32) -> f32 {
+    alpha(super::lanes::Arrays, paint, [x; 16], [y; 16])[0]
 }

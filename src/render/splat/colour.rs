@@ -49,9 +49,8 @@ pub(super) fn basis([x, y, z]: [f32; 3]) -> [f32; 16] {
 #[inline(always)]
 pub(super) fn direction(mean: [f32; 3], camera: [f32; 3], frame: [[f32; 3]; 3]) -> [f32; 3] {
     let d: [f32; 3] = std::array::from_fn(|i| mean[i] - camera[i]);
-    let turned: [f32; 3] = std::array::from_fn(|i| {
-        frame[2][i].mul_add(d[2], frame[1][i].mul_add(d[1], frame[0][i] * d[0]))
-    });
+    let turned: [f32; 3] =
+        std::array::from_fn(|i| frame[2][i].mul_add(d[2], frame[1][i].mul_add(d[1], frame[0][i] * d[0])));
     let square = turned[2].mul_add(turned[2], turned[1].mul_add(turned[1], turned[0] * turned[0]));
     let scale = if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 };
     turned.map(|v| v * scale)

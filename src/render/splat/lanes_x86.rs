@@ -1,8 +1,8 @@
 //! [`Lanes`] on AVX-512 (one register) and AVX2 (two).
 
 use super::lanes::Lanes;
-use pulp::{cast, f32x8, f32x16, m32x8};
 use pulp::x86::{V3, V4};
+use pulp::{cast, f32x8, f32x16, m32x8};
 
 impl Lanes for V4 {
     type F = f32x16;

@@ -55,10 +55,7 @@ impl View {
         let limit = |focal: f64, size: u32| JACOBIAN_LIMIT * (f64::from(size) / (2.0 * focal)) as f32;
         Self {
             rows,
-            clip: [
-                axis(rows[0], camera.fx, camera.cx, width),
-                axis(rows[1], camera.fy, camera.cy, height),
-            ],
+            clip: [axis(rows[0], camera.fx, camera.cx, width), axis(rows[1], camera.fy, camera.cy, height)],
             focal: [camera.fx as f32, camera.fy as f32],
             limit: [limit(camera.fx, width), limit(camera.fy, height)],
             size: [f64::from(width), f64::from(height)],

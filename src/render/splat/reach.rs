@@ -45,7 +45,12 @@ struct Bounds {
 
 impl Segment {
     /// Takes splats in drawing order; the strip begins at tile column `first_tile` and pixel row `top`.
-    pub(super) fn load<'a>(&mut self, splats: impl Iterator<Item = &'a Splat>, first_tile: usize, top: usize) {
+    pub(super) fn load<'a>(
+        &mut self,
+        splats: impl Iterator<Item = &'a Splat>,
+        first_tile: usize,
+        top: usize,
+    ) {
         self.paints.clear();
         self.bounds.clear();
         let left = (first_tile * TILE) as f32;

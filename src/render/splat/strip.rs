@@ -105,7 +105,8 @@ impl DrawStrip<'_, '_> {
         let blocks = &self.scratch.blocks;
         for y in 0..TILE {
             let (band, within) = (y / BLOCK, y % BLOCK);
-            let outputs = self.rows.colour[y].iter_mut().zip(&mut *self.rows.alpha[y]).zip(&mut *self.rows.depth[y]);
+            let outputs =
+                self.rows.colour[y].iter_mut().zip(&mut *self.rows.alpha[y]).zip(&mut *self.rows.depth[y]);
             for (x, ((colour, alpha), depth)) in outputs.enumerate() {
                 let block = &blocks[band * COLUMNS + x / BLOCK];
                 let pixel = block.pixel(within * BLOCK + x % BLOCK, self.background);
