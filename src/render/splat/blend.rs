@@ -122,3 +122,9 @@ fn exp2_negated<L: Lanes>(l: L, q: L::F) -> L::F {
     p = l.mul_add(p, f, l.splat(1.0));
     l.divide_by_power_of_two(p, n)
 }
+
+/// The alpha of a splat at one pixel.
+#[cfg(test)]
+pub(super) fn alpha_at(paint: &Paint, x: f32, y: f32) -> f32 {
+    alpha(super::lanes::Arrays, paint, [x; 16], [y; 16])[0]
+}

@@ -139,7 +139,7 @@ impl<K: Kernel, L: Lanes> pulp::NullaryFnOnce for OnLanes<K, L> {
 
 /// Plain arrays, left to the compiler.
 #[derive(Clone, Copy)]
-struct Arrays;
+pub(super) struct Arrays;
 
 #[inline(always)]
 fn map(a: [f32; 16], f: impl Fn(f32) -> f32) -> [f32; 16] {

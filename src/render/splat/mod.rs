@@ -19,6 +19,8 @@
 mod bin;
 mod blend;
 mod colour;
+#[cfg(test)]
+mod gaussians_fixture;
 mod lanes;
 #[cfg(target_arch = "x86_64")]
 mod lanes_x86;

@@ -32,6 +32,21 @@ pub(super) struct Paint {
     pub(super) depth: f32,
 }
 
+impl Paint {
+    #[inline(always)]
+    pub(super) fn new(p: &Projected, colour: [f32; 3]) -> Self {
+        let [a, b, c] = p.conic;
+        Self {
+            mean: p.mean,
+            conic: [HALF_LOG2_E * a, 2.0 * HALF_LOG2_E * b, HALF_LOG2_E * c],
+            opacity: p.opacity,
+            reach: p.reach,
+            colour,
+            depth: p.depth,
+        }
+    }
+}
+
 /// Projects the Gaussians `first..first + splats.len()`; the visible ones come out at the front of `splats`.
 pub(super) struct Preprocess<'a> {
     pub(super) posed: &'a Posed<'a>,
@@ -69,18 +84,7 @@ impl Kernel for Preprocess<'_> {
                 }
                 let reached = p.reached.map(|t| t as u16);
                 splats[written] = Splat {
-                    paint: Paint {
-                        mean: p.mean,
-                        conic: [
-                            HALF_LOG2_E * p.conic[0],
-                            2.0 * HALF_LOG2_E * p.conic[1],
-                            HALF_LOG2_E * p.conic[2],
-                        ],
-                        opacity: p.opacity,
-                        reach: p.reach,
-                        colour: colour::clamped(colour, posed.colour_clamp),
-                        depth: p.depth,
-                    },
+                    paint: Paint::new(&p, colour::clamped(colour, posed.colour_clamp)),
                     ellipse: p.ellipse,
                     columns: [reached[0], reached[1]],
                 };
