@@ -1,1 +1,3 @@
-//! (layer in construction)
+//! From a posed scene to an image: the triangle rasterizer.
+
+pub mod mesh;
