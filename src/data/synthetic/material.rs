@@ -236,8 +236,10 @@ impl Material {
     }
 
     fn head(&self, p: Vec3) -> Finish {
-        let ear = p.x.abs() > 0.0815 && p.y < 1.665;
-        if p.y > 1.617 + 0.85 * p.z && !ear && p.y > 1.53 {
+        let ear = p.x.abs() > 0.087 && p.y < 1.67;
+        // The hairline falls from the forehead to the nape, with a parting of its own on the left.
+        let hairline = 1.612 + 0.80 * p.z - 0.012 * (p.x * 30.0).sin();
+        if p.y > hairline && !ear && p.y > 1.535 {
             let strands = noise::fractal(Vec3::new(p.x * 260.0, p.y * 26.0, p.z * 60.0), self.seed ^ 5);
             let colour = self.hair * (1.0 + 1.3 * self.contrast() * (strands - 0.5));
             return self.finish(colour, p, 40.0, 0.36);
@@ -253,24 +255,25 @@ impl Material {
     fn face(&self, p: Vec3, skin: Finish) -> Finish {
         let ellipse = |x: f32, y: f32, rx: f32, ry: f32| Vec2::new((p.x.abs() - x) / rx, (p.y - y) / ry).length();
         let painted = |colour: Vec3, roughness| Finish { albedo: self.contrasted(colour, skin.albedo), roughness, ..skin };
-        let eye = ellipse(0.034, 1.634, 0.0145, 0.0075);
+        let eye = ellipse(0.033, 1.634, 0.0125, 0.0062);
         if eye < 1.0 {
             return match ellipse(0.033, 1.634, 1.0, 1.0) {
-                r if r < 0.0028 => painted(Vec3::splat(0.01), 0.15),
-                r if r < 0.0062 => painted(self.trousers[1] * 0.7, 0.15),
+                r if r < 0.0026 => painted(Vec3::splat(0.01), 0.15),
+                r if r < 0.0056 => painted(self.trousers[1] * 0.7, 0.15),
                 _ => painted(Vec3::splat(0.80), 0.2),
             };
         }
         if eye < 1.25 || ellipse(0.035, 1.6575 - 0.15 * (p.x.abs() - 0.03), 0.021, 0.0042) < 1.0 {
             return painted(self.hair * 0.6, 0.5);
         }
-        let lips = ellipse(0.0, 1.5665, 0.024, 0.0075);
-        if lips < 1.0 {
-            let line = (p.y - 1.5665).abs() < 0.0009;
-            return painted(self.skin * Vec3::new(0.85, 0.45, 0.42) * if line { 0.3 } else { 1.0 }, 0.3);
+        // A faint smile: the corners are higher than the middle.
+        let mouth = 1.5645 + 7.0 * p.x * p.x;
+        if ellipse(0.0, mouth, 0.024, 0.0065) < 1.0 {
+            let line = (p.y - mouth).abs() < 0.0009;
+            return painted(self.skin * Vec3::new(0.85, 0.50, 0.47) * if line { 0.3 } else { 1.0 }, 0.3);
         }
-        let blush = (1.0 - ellipse(0.042, 1.600, 0.026, 0.022)).max(0.0);
-        Finish { albedo: skin.albedo * Vec3::ONE.lerp(Vec3::new(1.05, 0.72, 0.70), blush), ..skin }
+        let blush = (1.0 - ellipse(0.040, 1.603, 0.026, 0.020)).max(0.0);
+        Finish { albedo: skin.albedo * Vec3::ONE.lerp(Vec3::new(1.02, 0.80, 0.78), blush), ..skin }
     }
 }
 

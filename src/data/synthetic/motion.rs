@@ -210,9 +210,9 @@ impl Actor<'_> {
     /// Upper arms down and forward, forearms raised, hands in view of a camera in front; `turn` twists the wrists.
     fn arms_before_chest(&mut self, left: f64, right: f64, turn_left: f64, turn_right: f64) {
         self.lower_arms(56.0 + left, 56.0 + right);
-        self.both("shoulder", [0.0, -18.0, 0.0]);
-        self.mirrored("elbow", [-70.0, 0.0, 0.0], [-70.0, 0.0, 0.0]);
-        self.mirrored("elbow", [0.0, 0.0, 82.0 + left], [0.0, 0.0, 82.0 + right]);
+        self.both("shoulder", [0.0, -12.0, 0.0]);
+        // The palms turn to the camera.
+        self.mirrored("elbow", [-55.0, -112.0 - left, 0.0], [-55.0, -112.0 - right, 0.0]);
         self.mirrored("wrist", [turn_left, 0.0, 0.0], [turn_right, 0.0, 0.0]);
         self.both("hip", [0.0, 5.0, 4.0]);
     }
@@ -253,8 +253,15 @@ impl Actor<'_> {
         let named = |name: &str| self.skeleton.names.iter().position(|n| n == name);
         let ankles: Vec<usize> = ["left_ankle", "right_ankle"].into_iter().filter_map(named).collect();
         let toes: Vec<usize> = ["left_foot", "right_foot"].into_iter().filter_map(named).collect();
-        let supports: Vec<usize> = if ankles.is_empty() { (0..rest.len()).collect() } else { ankles.clone() };
-        let middle: DVec3 = supports.iter().map(|&j| posed[j].translation).sum::<DVec3>() / supports.len() as f64;
+        let supports: Vec<DVec3> = if ankles.is_empty() {
+            // An arm's rest pose is centred: its tip is opposite its root.
+            let (last, tip) = (rest.len() - 1, -rest[0].translation);
+            let posed_tip = posed[last].transform_point3(tip - rest[last].translation);
+            posed.iter().map(|joint| joint.translation).chain([posed_tip]).collect()
+        } else {
+            ankles.iter().map(|&j| posed[j].translation).collect()
+        };
+        let middle = supports.iter().sum::<DVec3>() / supports.len() as f64;
         let sunk = ankles.iter().chain(&toes).map(|&j| posed[j].translation.y - rest[j].translation.y);
         let ground = sunk.fold(f64::INFINITY, f64::min);
         let height = if ankles.is_empty() { -middle.y } else { -ground };

@@ -65,7 +65,7 @@ fn framing(parameters: &Parameters) -> Framing {
             }
             Capture::Monocular | Capture::Multiview => {
                 let target = DVec3::Y * 0.49 * figure.height;
-                Framing { target, half_extent: 0.58 * figure.height, distance: 1.9 * figure.height }
+                Framing { target, half_extent: 0.55 * figure.height, distance: 1.9 * figure.height }
             }
         },
     }
