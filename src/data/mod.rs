@@ -1,3 +1,35 @@
-//! Bytes to scene types: the only place that knows formats; and the dataset that needs no bytes.
+//! Bytes to scene types and back: the only place that knows file formats.
+//!
+//! Every reader takes a path and returns scene types or one [`Error`] that names the file, the field and what was
+//! expected. Nothing is allocated from a count that the file's own length does not back, and every writer writes beside
+//! its target and renames ([`atomic`]).
+//!
+//! | module | formats |
+//! |---|---|
+//! | [`ply`] | 3DGS avatars, with their binding in extra properties |
+//! | [`body`] | SMPL-style `.npz`, skinned glTF 2.0 |
+//! | [`poses`] | SMPL-style `.npz` and JSON, glTF clips |
+//! | [`camera`] | camera JSON, `transforms.json`, `cameras.npz` |
+//! | [`frames`] | PNG, JPEG and `.npy` images and masks |
+//! | [`npy`], [`npz`] | NumPy arrays |
+//! | [`folder`] | a subject as a folder of sequences |
+//! | [`sequence`] | posed frames with their cameras, decoded when asked for |
+//! | [`synthetic`] | subjects generated in-process, no file needed |
 
+pub mod atomic;
+pub mod body;
+pub mod camera;
+pub mod error;
+pub mod folder;
+pub mod frames;
+pub mod gltf;
+pub mod npy;
+pub mod npz;
+pub mod ply;
+pub mod poses;
+pub mod sequence;
 pub mod synthetic;
+
+pub use error::Error;
+pub use folder::Subject;
+pub use sequence::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};

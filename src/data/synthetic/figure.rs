@@ -7,11 +7,12 @@ use super::{atlas, flesh, surface, weights};
 use crate::scene::body::vertex_normals;
 use crate::scene::{RestBody, SceneError, Skeleton};
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// A body and the surface attributes that belong to its vertices.
 #[derive(Clone, Debug)]
 pub(super) struct Figure {
-    pub(super) body: RestBody,
+    pub(super) body: Arc<RestBody>,
     /// Positions on the reference adult, where the material is defined (metres); for an arm (bones along it, and the
     /// position across in radii).
     pub(super) material_positions: Vec<Vec3>,
@@ -89,7 +90,7 @@ fn assemble(
     };
     body.validate()?;
     let rest_normals = normals.iter().map(|n| n.as_vec3()).collect();
-    Ok(Figure { body, material_positions, openness, rest_normals })
+    Ok(Figure { body: Arc::new(body), material_positions, openness, rest_normals })
 }
 
 /// How much of the surrounding a point of the rest pose sees: how fast free space opens along the normal, at distances

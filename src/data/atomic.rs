@@ -1,0 +1,90 @@
+//! Writing a file so that a reader sees all of it or none: beside the target, then renamed.
+
+use super::Error;
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+/// Writes `path` through `fill`. A regular file appears complete or not at all, and replaces an older one at once; a
+/// device or a pipe (`/dev/stdout`) is written to directly, since it must not be replaced.
+///
+/// # Errors
+/// [`Error::Write`] for a missing or protected folder, a full disk, a path that is a folder. Nothing is left behind.
+pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> Result<(), Error> {
+    let written = match std::fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => Err(io::Error::from(io::ErrorKind::IsADirectory)),
+        Ok(metadata) if !metadata.is_file() => {
+            OpenOptions::new().write(true).open(path).and_then(|f| filled(&f, fill))
+        }
+        _ => beside(path, fill),
+    };
+    written.map_err(|cause| Error::write(path, "file", cause))
+}
+
+fn beside(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".writing-");
+    #[cfg(unix)]
+    {
+        // The usual mode of a new file (the umask still applies), not the private one of a temporary file.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let file = builder.tempfile_in(folder)?;
+    filled(file.as_file(), fill)?;
+    file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}
+
+fn filled(file: &File, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
+    let mut writer = BufWriter::with_capacity(1 << 18, file);
+    fill(&mut writer)?;
+    writer.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries(folder: &Path) -> usize {
+        std::fs::read_dir(folder).unwrap().count()
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.bin");
+        write(&path, |w| w.write_all(b"first")).unwrap();
+        let error = write(&path, |w| {
+            w.write_all(b"half")?;
+            Err(io::Error::from(io::ErrorKind::StorageFull))
+        })
+        .unwrap_err();
+        assert_eq!(error.path(), path);
+        assert_eq!((std::fs::read(&path).unwrap(), entries(folder.path())), (b"first".to_vec(), 1));
+        write(&path, |w| w.write_all(b"second")).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"second");
+    }
+
+    #[test]
+    fn missing_folders_and_folders_as_targets_are_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        for path in [folder.path().join("missing/out.bin"), folder.path().to_path_buf()] {
+            let error = write(&path, |w| w.write_all(b"x")).unwrap_err();
+            assert!(matches!(error, Error::Write { .. }), "{error}");
+        }
+        assert_eq!(entries(folder.path()), 0);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_device_is_an_error_and_stays_a_device() {
+        let error = write(Path::new("/dev/full"), |w| w.write_all(&[0; 1 << 20])).unwrap_err();
+        assert!(error.to_string().starts_with("/dev/full: file: cannot write"), "{error}");
+        assert!(!std::fs::metadata("/dev/full").unwrap().is_file());
+    }
+}
