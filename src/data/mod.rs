@@ -16,6 +16,7 @@
 //! | [`peoplesnapshot`] | PeopleSnapshot as prepared for InstantAvatar |
 //! | [`registry`] | `datasets.toml` |
 //! | [`sequence`] | posed frames with their cameras, decoded when asked for |
+//! | [`synthetic`] | subjects generated in-process, no file needed |
 
 pub mod atomic;
 pub mod body;
@@ -33,6 +34,7 @@ pub mod poses;
 mod reduce;
 pub mod registry;
 pub mod sequence;
+pub mod synthetic;
 
 pub use error::Error;
 pub use folder::{Capture, Subject};

@@ -1,0 +1,279 @@
+//! Implicit surface to triangle mesh: surface nets on an octree's leaves, seen through lenses that magnify fine parts,
+//! then relaxed on the surface into well-shaped triangles.
+//!
+//! The mesh is closed and consistently oriented by construction: every grid edge that crosses the surface gives one
+//! quad between the four cells around it.
+
+use super::field::Field;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// A place that is sampled more finely, smoothly falling off around it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lens {
+    /// Centre, metres.
+    pub(super) centre: DVec3,
+    /// Half width of the magnified region, metres.
+    pub(super) radius: f64,
+    /// Samples per metre at the centre, relative to those far away.
+    pub(super) power: f64,
+}
+
+/// The map from the space of the uniform grid to the world: the identity minus convex gradients, hence one-to-one; it
+/// never enlarges a distance.
+struct Warp {
+    cell: f64,
+    /// Lenses with their centre in grid space (metres) and the radius there.
+    lenses: Vec<Lens>,
+}
+
+impl Warp {
+    fn new(cell: f64, lenses: &[Lens]) -> Self {
+        let mut warp = Self { cell, lenses: lenses.to_vec() };
+        for lens in &mut warp.lenses {
+            lens.radius *= lens.power;
+        }
+        // Each centre must map to where it was asked for; lenses shift each other only slightly, so this settles.
+        for _ in 0..20 {
+            let shifts: Vec<DVec3> = warp.lenses.iter().map(|l| warp.shift(l.centre)).collect();
+            for ((lens, asked), shift) in warp.lenses.iter_mut().zip(lenses).zip(shifts) {
+                lens.centre = asked.centre + shift;
+            }
+        }
+        warp
+    }
+
+    fn shift(&self, point: DVec3) -> DVec3 {
+        let one = |lens: &Lens| {
+            let offset = point - lens.centre;
+            let ratio = offset.length_squared() / (lens.radius * lens.radius);
+            let falloff = (1.0 + ratio * ratio).sqrt().sqrt();
+            offset * ((1.0 - 1.0 / lens.power) / falloff)
+        };
+        self.lenses.iter().map(one).sum()
+    }
+
+    /// World position of a point in units of cells.
+    fn world(&self, grid: DVec3) -> DVec3 {
+        let point = grid * self.cell;
+        point - self.shift(point)
+    }
+
+    /// No point is moved farther than this, metres.
+    fn largest_shift(&self) -> f64 {
+        self.lenses.iter().map(|l| l.radius * (1.0 - 1.0 / l.power)).sum()
+    }
+}
+
+type Cell = [i32; 3];
+
+/// Cells per side of an octree leaf.
+const LEAF: i32 = 4;
+const SIDE: usize = LEAF as usize + 1;
+
+/// A vertex of the net: one per cell and connected group of inside corners.
+struct NetVertex {
+    cell: Cell,
+    /// Bit c is set if corner c of the cell belongs to the group; corner c is at (c & 1, c >> 1 & 1, c >> 2).
+    corners: u8,
+    position: DVec3,
+}
+
+/// A triangle mesh, counter-clockwise seen from outside.
+#[derive(Clone, Debug)]
+pub(super) struct Mesh {
+    pub(super) vertices: Vec<DVec3>,
+    pub(super) faces: Vec<[u32; 3]>,
+}
+
+/// Meshes the zero level of a field with cells of `cell` metres, finer under the lenses.
+pub(super) fn mesh(field: &Field, cell: f64, lenses: &[Lens]) -> Mesh {
+    let warp = Warp::new(cell, lenses);
+    let nets: Vec<(Vec<NetVertex>, Vec<Crossing>)> =
+        leaves(field, &warp).par_iter().map(|&leaf| net_in_leaf(field, &warp, leaf)).collect();
+    let mut net: Vec<NetVertex> = Vec::new();
+    let mut crossings = Vec::new();
+    for (vertices, edges) in nets {
+        net.extend(vertices);
+        crossings.extend(edges);
+    }
+    net.sort_by_key(|v| (v.cell, v.corners));
+    let quads: Vec<[u32; 4]> = crossings.iter().filter_map(|edge| edge.quad(&net)).collect();
+    let mut vertices: Vec<DVec3> = net.iter().map(|v| v.position).collect();
+    relax(field, &mut vertices, &quads);
+    Mesh { faces: split(&vertices, &quads), vertices }
+}
+
+/// Octree leaves that may hold surface, in a fixed order.
+fn leaves(field: &Field, warp: &Warp) -> Vec<Cell> {
+    let (low, high) = field.bounds();
+    let centre = (low + high) / 2.0;
+    let half = (high - low).max_element() / 2.0 + warp.largest_shift() + warp.cell;
+    let mut size = LEAF;
+    while f64::from(size) * warp.cell < 2.0 * half {
+        size *= 2;
+    }
+    let corner = (centre / warp.cell - f64::from(size) / 2.0).floor();
+    let mut stack = vec![([corner.x as i32, corner.y as i32, corner.z as i32], size)];
+    let mut leaves = Vec::new();
+    while let Some((corner, size)) = stack.pop() {
+        let middle = grid_point(corner) + f64::from(size) / 2.0;
+        let half_diagonal = f64::from(size) * warp.cell * 3f64.sqrt() / 2.0;
+        if field.distance(warp.world(middle)).abs() > half_diagonal {
+            continue;
+        }
+        if size == LEAF {
+            leaves.push(corner);
+            continue;
+        }
+        let half = size / 2;
+        stack.extend((0..8).map(|c| (std::array::from_fn(|axis| corner[axis] + half * (c >> axis & 1)), half)));
+    }
+    leaves
+}
+
+fn grid_point(cell: Cell) -> DVec3 {
+    DVec3::from_array(cell.map(f64::from))
+}
+
+/// A grid edge that crosses the surface.
+struct Crossing {
+    lower: Cell,
+    axis: usize,
+    /// True if its lower end is inside.
+    lower_inside: bool,
+}
+
+impl Crossing {
+    /// The vertices of the four cells around the edge, counter-clockwise seen from outside.
+    fn quad(&self, net: &[NetVertex]) -> Option<[u32; 4]> {
+        let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
+        let mut quad = [0; 4];
+        for (slot, (back_u, back_v)) in [(1, 1), (0, 1), (0, 0), (1, 0)].into_iter().enumerate() {
+            let mut cell = self.lower;
+            cell[u] -= back_u;
+            cell[v] -= back_v;
+            let inside_end = i32::from(!self.lower_inside);
+            let corner = (inside_end << self.axis) | (back_u << u) | (back_v << v);
+            let first = net.partition_point(|n| n.cell < cell);
+            let here = net[first..].iter().take_while(|n| n.cell == cell);
+            let group = here.into_iter().position(|n| n.corners >> corner & 1 == 1)?;
+            quad[slot] = (first + group) as u32;
+        }
+        if !self.lower_inside {
+            quad.reverse();
+        }
+        Some(quad)
+    }
+}
+
+fn net_in_leaf(field: &Field, warp: &Warp, leaf: Cell) -> (Vec<NetVertex>, Vec<Crossing>) {
+    let index = |p: [usize; 3]| p[0] + SIDE * (p[1] + SIDE * p[2]);
+    let positions = |i: usize| [i % SIDE, i / SIDE % SIDE, i / (SIDE * SIDE)];
+    let global = |p: [usize; 3]| -> Cell { std::array::from_fn(|axis| leaf[axis] + p[axis] as i32) };
+    let value = |i| field.distance(warp.world(grid_point(global(positions(i)))));
+    let values: Vec<f64> = (0..SIDE.pow(3)).map(value).collect();
+    let (mut vertices, mut crossings) = (Vec::new(), Vec::new());
+    for cell in (0..values.len()).map(positions).filter(|p| p.iter().all(|&c| c + 1 < SIDE)) {
+        let corner_at = |c: usize| std::array::from_fn(|axis| cell[axis] + (c >> axis & 1));
+        let corners: [f64; 8] = std::array::from_fn(|c| values[index(corner_at(c))]);
+        let inside = (0..8).fold(0u8, |mask, c| mask | u8::from(corners[c] < 0.0) << c);
+        if inside == 0 || inside == u8::MAX {
+            continue;
+        }
+        for group in inside_groups(inside) {
+            let position = warp.world(grid_point(global(cell)) + mean_crossing(&corners, group, inside));
+            vertices.push(NetVertex { cell: global(cell), corners: group, position });
+        }
+        let lower_inside = inside & 1 == 1;
+        for axis in (0..3).filter(|axis| (inside >> (1 << axis) & 1 == 1) != lower_inside) {
+            crossings.push(Crossing { lower: global(cell), axis, lower_inside });
+        }
+    }
+    (vertices, crossings)
+}
+
+/// Inside corners connected by cell edges: two sheets that pass through one cell get a vertex each.
+fn inside_groups(inside: u8) -> Vec<u8> {
+    let mut left = inside;
+    let mut groups = Vec::new();
+    while left != 0 {
+        let mut group = left & left.wrapping_neg();
+        loop {
+            let neighbours = (group & 0x55) << 1 | (group & 0xaa) >> 1
+                | (group & 0x33) << 2 | (group & 0xcc) >> 2
+                | group << 4 | group >> 4;
+            let grown = group | (neighbours & inside);
+            if grown == group {
+                break;
+            }
+            group = grown;
+        }
+        groups.push(group);
+        left &= !group;
+    }
+    groups
+}
+
+/// Mean of the zero crossings on the cell's edges that leave a group, relative to the cell's lower corner.
+fn mean_crossing(corners: &[f64; 8], group: u8, inside: u8) -> DVec3 {
+    let at = |c: usize| DVec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64);
+    let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+    for from in (0..8).filter(|c| group >> c & 1 == 1) {
+        for to in [from ^ 1, from ^ 2, from ^ 4].into_iter().filter(|c| inside >> c & 1 == 0) {
+            let t = corners[from] / (corners[from] - corners[to]);
+            sum += at(from).lerp(at(to), t);
+            count += 1.0;
+        }
+    }
+    sum / count
+}
+
+const RELAXATIONS: usize = 12;
+
+/// Moves vertices towards the mean of their neighbours along the surface, and back onto it by Newton steps.
+fn relax(field: &Field, vertices: &mut Vec<DVec3>, quads: &[[u32; 4]]) {
+    let neighbours = quad_neighbours(vertices.len(), quads);
+    for _ in 0..RELAXATIONS {
+        let moved = |(&vertex, around): (&DVec3, &Vec<u32>)| {
+            let mean = around.iter().map(|&i| vertices[i as usize]).sum::<DVec3>() / around.len() as f64;
+            let normal = field.sample(vertex).gradient.normalize_or_zero();
+            let step = (mean - vertex) * 0.6;
+            let mut position = vertex + step - normal * step.dot(normal);
+            for _ in 0..2 {
+                let here = field.sample(position);
+                let slope = here.gradient.length_squared();
+                if slope > 1e-2 {
+                    position -= here.gradient * (here.distance / slope);
+                }
+            }
+            position
+        };
+        *vertices = vertices.par_iter().zip(&neighbours).map(moved).collect();
+    }
+}
+
+fn quad_neighbours(count: usize, quads: &[[u32; 4]]) -> Vec<Vec<u32>> {
+    let mut neighbours = vec![Vec::new(); count];
+    for quad in quads {
+        for k in 0..4 {
+            // Each edge is seen once in this direction: two quads traverse it oppositely.
+            neighbours[quad[k] as usize].push(quad[(k + 1) % 4]);
+        }
+    }
+    neighbours
+}
+
+/// Two triangles per quad, along the diagonal that leaves the larger smallest angle.
+fn split(vertices: &[DVec3], quads: &[[u32; 4]]) -> Vec<[u32; 3]> {
+    let smallest_angle = |face: [u32; 3]| {
+        let p = face.map(|i| vertices[i as usize]);
+        (0..3).map(|k| (p[(k + 1) % 3] - p[k]).angle_between(p[(k + 2) % 3] - p[k])).fold(4.0, f64::min)
+    };
+    let triangles = |&[a, b, c, d]: &[u32; 4]| {
+        let (one, other) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
+        let worst = |pair: [[u32; 3]; 2]| pair.map(smallest_angle).into_iter().fold(4.0, f64::min);
+        if worst(one) >= worst(other) { one } else { other }
+    };
+    quads.iter().flat_map(triangles).collect()
+}
