@@ -3,10 +3,7 @@
 
 #[path = "support/splat_scene.rs"]
 mod splat_scene;
-<<<<<<< HEAD
-=======
 #[allow(unreachable_pub, reason = "shared by several test binaries")]
->>>>>>> splat
 mod support;
 
 use glam::{DMat4, Quat, Vec3};

@@ -52,7 +52,8 @@ fn smoothed_labels(normals: &[DVec3], parts: &[usize], neighbours: &[Vec<usize>]
     let mut labels: Vec<(usize, usize)> = normals.iter().zip(parts).map(|(n, &p)| (p, nearest(n))).collect();
     for _ in 0..6 {
         let better = |i: usize| {
-            let around = |label: (usize, usize)| neighbours[i].iter().filter(|&&n| labels[n] == label).count();
+            let around =
+                |label: (usize, usize)| neighbours[i].iter().filter(|&&n| labels[n] == label).count();
             let allowed = |label: &(usize, usize)| {
                 label.0 == parts[i] && normals[i].dot(axis_vector(label.1)) > 0.35 && around(*label) >= 2
             };

@@ -57,7 +57,10 @@ fn build_arm(shape: ArmShape) -> Result<Figure, SceneError> {
     };
     // Round ends, inside the length.
     let end = DVec3::X * (length / 2.0 - radius);
-    let field = Field { parts: vec![Part::new(vec![Capsule::new(-end, radius, end, radius)], 0.01, 0.01)], floor: None };
+    let field = Field {
+        parts: vec![Part::new(vec![Capsule::new(-end, radius, end, radius)], 0.01, 0.01)],
+        floor: None,
+    };
     let mesh = surface::mesh(&field, edge, &[]);
     let claims = weights::chain_claims(&joints, softness * bone);
     let material = |v: &DVec3| DVec3::new((v.x - start) / bone, v.y / radius, v.z / radius).as_vec3();

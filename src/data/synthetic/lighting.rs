@@ -38,7 +38,8 @@ const WRAP: f32 = 0.15;
 /// Radiance of the surrounding from a direction: bright above, dark below, a soft window to the front left.
 fn surrounding(direction: Vec3, roughness: f32) -> Vec3 {
     let height = (direction.y * 0.5 + 0.5).clamp(0.0, 1.0);
-    let sky = Vec3::new(0.12, 0.11, 0.10).lerp(Vec3::new(0.58, 0.62, 0.68), height * height * (3.0 - 2.0 * height));
+    let sky =
+        Vec3::new(0.12, 0.11, 0.10).lerp(Vec3::new(0.58, 0.62, 0.68), height * height * (3.0 - 2.0 * height));
     let window = direction.dot(Vec3::new(-0.549_442, 0.457_869, 0.699_290));
     let edge = 0.08 + roughness * 0.6;
     let glow = ((window - 0.80 + edge) / (2.0 * edge)).clamp(0.0, 1.0);
@@ -88,7 +89,8 @@ pub(super) fn to_srgb(radiance: Vec3) -> [f32; 3] {
     radiance.to_array().map(|c| {
         // The identity up to the knee, then an exponential approach to 1 with the same slope.
         const KNEE: f32 = 0.7;
-        let rolled = if c <= KNEE { c.max(0.0) } else { 1.0 - (1.0 - KNEE) * (-(c - KNEE) / (1.0 - KNEE)).exp() };
+        let rolled =
+            if c <= KNEE { c.max(0.0) } else { 1.0 - (1.0 - KNEE) * (-(c - KNEE) / (1.0 - KNEE)).exp() };
         if rolled <= 0.003_130_8 { 12.92 * rolled } else { 1.055 * rolled.powf(1.0 / 2.4) - 0.055 }
     })
 }

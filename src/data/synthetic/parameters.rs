@@ -279,7 +279,9 @@ impl Parameters {
             ("test_cameras", f64::from(self.test_cameras), 1.0, 64.0),
         ])?;
         if self.capture != Capture::Multiview {
-            for (field, cameras) in [("train_cameras", self.train_cameras), ("test_cameras", self.test_cameras)] {
+            for (field, cameras) in
+                [("train_cameras", self.train_cameras), ("test_cameras", self.test_cameras)]
+            {
                 if cameras != 1 {
                     let problem = format!("{cameras} cameras");
                     return Err(SceneError::new(field, problem, "1 unless capture is \"multiview\""));
@@ -287,7 +289,11 @@ impl Parameters {
             }
         }
         if self.capture == Capture::Hands && matches!(self.rig, Rig::Arm(_)) {
-            return Err(SceneError::new("rig.kind", "\"arm\" has no hands", "\"figure\" for capture \"hands\""));
+            return Err(SceneError::new(
+                "rig.kind",
+                "\"arm\" has no hands",
+                "\"figure\" for capture \"hands\"",
+            ));
         }
         Ok(())
     }

@@ -127,7 +127,9 @@ fn leaves(field: &Field, warp: &Warp) -> Vec<Cell> {
             continue;
         }
         let half = size / 2;
-        stack.extend((0..8).map(|c| (std::array::from_fn(|axis| corner[axis] + half * (c >> axis & 1)), half)));
+        stack.extend(
+            (0..8).map(|c| (std::array::from_fn(|axis| corner[axis] + half * (c >> axis & 1)), half)),
+        );
     }
     leaves
 }
@@ -200,9 +202,12 @@ fn inside_groups(inside: u8) -> Vec<u8> {
     while left != 0 {
         let mut group = left & left.wrapping_neg();
         loop {
-            let neighbours = (group & 0x55) << 1 | (group & 0xaa) >> 1
-                | (group & 0x33) << 2 | (group & 0xcc) >> 2
-                | group << 4 | group >> 4;
+            let neighbours = (group & 0x55) << 1
+                | (group & 0xaa) >> 1
+                | (group & 0x33) << 2
+                | (group & 0xcc) >> 2
+                | group << 4
+                | group >> 4;
             let grown = group | (neighbours & inside);
             if grown == group {
                 break;
