@@ -80,7 +80,11 @@ impl Blend {
 fn solve(case: &Case) -> Result<Answer> {
     let (quats, weights) = (&case.quats_wxyz, &case.weights);
     if quats.len() != weights.len() || quats.is_empty() {
-        bail!("{} quats_wxyz and {} weights; expected as many of both, at least one", quats.len(), weights.len());
+        bail!(
+            "{} quats_wxyz and {} weights; expected as many of both, at least one",
+            quats.len(),
+            weights.len()
+        );
     }
     let Some(exact) = average(quats, weights, Solver::Eigen) else {
         bail!("expected finite quats_wxyz of length above 0 and finite weights >= 0 that are not all 0");

@@ -90,7 +90,11 @@ impl Subject {
     }
 
     /// Poses the avatar and hands the Gaussians to `use_posed`; without a body they stay where they are.
-    pub(super) fn posed<T>(&self, strategy: &Strategy, use_posed: impl FnOnce(&Posed) -> Result<T>) -> Result<T> {
+    pub(super) fn posed<T>(
+        &self,
+        strategy: &Strategy,
+        use_posed: impl FnOnce(&Posed) -> Result<T>,
+    ) -> Result<T> {
         match &self.rest {
             None => use_posed(&Posed::from_static(&self.avatar.gaussians)),
             Some((rest, pose)) => {

@@ -131,12 +131,15 @@ impl Score {
             let frames: BTreeMap<&str, &Scored> = scored.iter().map(|f| (f.name.as_str(), f)).collect();
             return emit_json(&json!({ "frames": frames, "mean": mean, "protocol": summary }));
         }
-        let mean = Scored { name: format!("mean of {} frames", scored.len()), variants: mean, ..Scored::empty() };
+        let mean =
+            Scored { name: format!("mean of {} frames", scored.len()), variants: mean, ..Scored::empty() };
         emit(&(scored.iter().map(Scored::text).collect::<String>() + &mean.text()))?;
         if let Some(s) = summary {
             let lpips = s.lpips.map_or("not computed".to_owned(), |v| format!("{v:.6}"));
-            let id = format!("{}@{}", s.protocol.id, s.protocol.version);
-            emit(&format!("protocol {id}: psnr {:.6}  ssim {:.6}  lpips {lpips}\n", s.psnr, s.ssim))?;
+            emit(&format!(
+                "protocol {}: psnr {:.6}  ssim {:.6}  lpips {lpips}\n",
+                s.protocol, s.psnr, s.ssim
+            ))?;
         }
         Ok(())
     }
@@ -158,8 +161,8 @@ impl Scored {
         }
         if let Some(score) = &self.protocol {
             let lpips = score.lpips.map_or("not computed".to_owned(), |v| format!("{v:.6}"));
-            let id = format!("{}@{}", score.protocol.id, score.protocol.version);
-            text += &format!("  {id}: psnr {:.6}  ssim {:.6}  lpips {lpips}\n", score.psnr, score.ssim);
+            let FrameScore { protocol, psnr, ssim, .. } = score;
+            text += &format!("  {protocol}: psnr {psnr:.6}  ssim {ssim:.6}  lpips {lpips}\n");
         }
         text
     }

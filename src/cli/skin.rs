@@ -2,6 +2,8 @@
 
 use super::{Context, Exit, posing::Posing};
 use crate::data::ply;
+use crate::scene::{Avatar, Binding};
+use crate::strategy::bake;
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 
@@ -27,8 +29,11 @@ impl Skin {
         }
         let subject = self.posing.load(&self.avatar)?;
         let strategy = self.posing.strategy();
-        let baked = subject.posed(strategy, |posed| Ok(crate::strategy::bake(posed)))?;
-        ply::write_static(&self.out, &baked.gaussians, &[&format!("posed by {strategy}")])?;
+        let canonical = &subject.avatar().gaussians;
+        let baked = subject.posed(strategy, |posed| Ok(bake(posed, canonical)))?;
+        let avatar = Avatar { gaussians: baked.gaussians, binding: Binding::Static };
+        let metadata = ply::Metadata { body: None, comments: vec![format!("posed by {strategy}")] };
+        ply::write_avatar(&self.out, &avatar, &metadata, ply::Encoding::LittleEndian)?;
         if let Some(loss) = baked.loss {
             context.note(format!("{}: {loss}", self.out.display()));
         }

@@ -26,6 +26,7 @@ pub mod error;
 pub mod folder;
 pub mod frames;
 pub mod gltf;
+mod load;
 pub mod npy;
 pub mod npz;
 pub mod peoplesnapshot;

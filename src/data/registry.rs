@@ -37,6 +37,9 @@ pub struct Dataset {
     /// Body model for layouts that do not bring one. Absolute after loading.
     #[serde(default)]
     pub model: Option<PathBuf>,
+    /// Whether its subjects may stand in for those of a dataset that is not here.
+    #[serde(default = "yes")]
+    pub stand_in: bool,
     /// Folder names of the subjects; empty if `path` is the only subject.
     #[serde(default)]
     pub subjects: Vec<String>,
@@ -46,6 +49,11 @@ pub struct Dataset {
     /// What the generator of a synthetic dataset is given.
     #[serde(default)]
     pub parameters: toml::Table,
+}
+
+/// The default of [`Dataset::stand_in`].
+fn yes() -> bool {
+    true
 }
 
 /// How a dataset is stored.
@@ -219,6 +227,7 @@ fn found(folder: &Path) -> Result<Dataset, Error> {
         provenance: "found by scanning a folder".to_owned(),
         path: Some(folder.to_owned()),
         model: None,
+        stand_in: true,
         subjects: Vec::new(),
         splits: BTreeMap::new(),
         parameters: toml::Table::new(),

@@ -60,6 +60,12 @@ pub struct ProtocolId {
     pub version: u32,
 }
 
+impl std::fmt::Display for ProtocolId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}@{}", self.id, self.version)
+    }
+}
+
 /// How frames are scored. The steps, in this order:
 ///
 /// 1. a straight truth is composited over `background` (the render already lies over it);

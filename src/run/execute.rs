@@ -1,7 +1,7 @@
 //! Executing jobs: one frame at a time, its truth loaded once, every variant posed, rendered and scored against it.
 
 use super::avatars::{Prepared, prepare};
-use super::store::{Store, outstanding};
+use super::store::Store;
 use super::{Error, Library};
 use crate::data::{Sequence, Truth};
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
@@ -13,7 +13,7 @@ use crate::strategy::{self, Strategy};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// What happened, for whoever watches.
@@ -23,13 +23,8 @@ pub enum Event {
     Avatars(usize),
     /// One of them is there.
     AvatarReady,
-    /// So many frames are left to render, of so many that the plan has.
-    Frames {
-        /// To be done now.
-        left: usize,
-        /// In the plan.
-        planned: usize,
-    },
+    /// So many jobs are to be done.
+    Frames(usize),
     /// One of them is done.
     FrameDone,
 }
@@ -37,7 +32,7 @@ pub enum Event {
 /// Samples per pixel side with which textured meshes are drawn: 16 samples on a rotated grid.
 const MESH_SAMPLES: usize = 4;
 
-/// Does what the plan asks and the store has no record of. Interrupted at any point, it picks up where it left off.
+/// Does the jobs (what [`super::store::outstanding`] left of a plan's), and appends every record to the store as it comes.
 ///
 /// A frame that fails leaves a record that says why, and the others go on.
 ///
@@ -45,20 +40,18 @@ const MESH_SAMPLES: usize = 4;
 /// An avatar that cannot be made, or a store or folder that cannot be written.
 pub fn execute(
     plan: &Plan,
-    jobs: &[&Job],
+    jobs: &[Job],
     library: &Library,
     folder: &Path,
     store: &mut Store,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<(), Error> {
-    let left = outstanding(jobs.iter().copied(), store.records());
-    let avatars = prepare_avatars(plan, &left, library, folder, watch)?;
-    watch(Event::Frames { left: left.len(), planned: jobs.len() });
+    let avatars = prepare_avatars(plan, jobs, library, folder, watch)?;
+    watch(Event::Frames(jobs.len()));
     let store = Mutex::new(store);
-    let groups = by_frame(&left);
-    groups.par_iter().try_for_each_init(Renderer::new, |renderer, group| {
+    by_frame(jobs).par_iter().try_for_each_init(Renderer::new, |renderer, group| {
         let records = run_frame(group, library, &avatars, renderer);
-        let mut store = store.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut store = store.lock().unwrap_or_else(PoisonError::into_inner);
         store.append(&records)?;
         group.iter().for_each(|_| watch(Event::FrameDone));
         Ok::<(), Error>(())

@@ -17,6 +17,7 @@
 //!
 //! [`Posed`]: crate::scene::Posed
 
+mod bake;
 mod blend;
 mod bound;
 mod choices;
@@ -33,6 +34,7 @@ mod rest_faces;
 mod rotate;
 mod spec;
 
+pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;
 pub use choices::{
     ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,

@@ -1,0 +1,50 @@
+//! Which data a command looks at.
+
+use crate::data::folder::Options;
+use crate::data::registry::{Dataset, Registry};
+use crate::experiment::Experiment;
+use crate::run::{Library, LoadedDataset};
+use anyhow::Result;
+use std::path::{Path, PathBuf};
+
+/// Where data comes from.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Data")]
+pub(super) struct Data {
+    /// Run on the subjects of this folder: a subject, a folder of subjects, or a folder with datasets/ in it
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Registry of datasets [default: datasets.toml in this folder if there is one, else the built-in registry]
+    #[arg(long, value_name = "FILE", conflicts_with = "data")]
+    datasets: Option<PathBuf>,
+    /// Displace bodies by the clothing that a subject's gt_normal_offset.npy holds
+    #[arg(long)]
+    clothing: bool,
+}
+
+impl Data {
+    /// The registry that the arguments name.
+    pub(super) fn registry(&self) -> Result<Registry> {
+        let local = Path::new("datasets.toml");
+        Ok(match (&self.data, &self.datasets) {
+            (Some(folder), _) => Registry::scan(folder)?,
+            (None, Some(file)) => Registry::load(file)?,
+            (None, None) if local.is_file() => Registry::load(local)?,
+            (None, None) => Registry::embedded(),
+        })
+    }
+
+    /// Loads what the experiments can use: their own datasets, and those that may stand in.
+    pub(super) fn library(&self, experiments: &[Experiment]) -> Result<Library> {
+        let options = Options { model: None, clothing: self.clothing };
+        let own = |id: &str| experiments.iter().any(|experiment| experiment.dataset == id);
+        let stands_in = experiments.iter().any(|experiment| experiment.stand_in.is_some());
+        let wanted = |d: &&Dataset| d.is_available() && (own(&d.id) || (stands_in && d.stand_in));
+        let mut loaded = Vec::new();
+        for dataset in self.registry()?.datasets.iter().filter(wanted) {
+            let subjects = dataset.load(&options)?;
+            loaded.push(LoadedDataset { id: dataset.id.clone(), title: dataset.title.clone(), subjects });
+        }
+        Ok(Library::new(loaded))
+    }
+}

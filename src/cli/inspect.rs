@@ -1,0 +1,211 @@
+//! `reproduce inspect`: what a file holds, and what is wrong with it.
+
+use super::Exit;
+use super::output::emit;
+use crate::data::folder::{self, Options};
+use crate::data::npz::Archive;
+use crate::data::{self, Subject, body, camera, frames, ply, poses};
+use crate::report::Results;
+use crate::run::store;
+use crate::scene::{Avatar, Binding, Body, Image, Mask};
+use anyhow::{Context as _, Result, anyhow, bail};
+use std::path::{Path, PathBuf};
+
+/// Show what a file or folder holds, and what is wrong with it.
+///
+/// Reads avatars (.ply), bodies (.npz, .glb, .gltf), poses and cameras (.npz, .json), images, a subject's folder, a
+/// folder of subjects, results.json and the results store of a run.
+#[derive(Debug, clap::Args)]
+pub(super) struct Inspect {
+    /// What to look at
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+}
+
+impl Inspect {
+    pub(super) fn run(&self) -> Result<Exit> {
+        let path = &self.file;
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+        let text = match extension.as_str() {
+            _ if path.is_dir() => folder_text(path)?,
+            "ply" => avatar_text(&ply::read(path)?),
+            "glb" | "gltf" => body_text(&body::load(path)?) + &clips_text(path)?,
+            "npz" => archive_text(path)?,
+            "json" => json_text(path)?,
+            "jsonl" => store_text(path)?,
+            "png" | "jpg" | "jpeg" | "npy" => image_text(&frames::load_image(path)?),
+            _ => {
+                let expected = ".ply, .npz, .glb, .gltf, .json, .jsonl, .png, .jpg, .npy or a folder";
+                bail!("{}: unknown kind of file; expected {expected}", path.display())
+            }
+        };
+        emit(&format!("{}\n{text}", path.display()))?;
+        Ok(Exit::Success)
+    }
+}
+
+/// A line of a listing.
+fn line(name: &str, value: impl std::fmt::Display) -> String {
+    format!("  {name:<20} {value}\n")
+}
+
+/// Minimum, median and maximum.
+fn spread(values: impl IntoIterator<Item = f32>) -> String {
+    let mut sorted: Vec<f32> = values.into_iter().collect();
+    sorted.sort_by(f32::total_cmp);
+    match (sorted.first(), sorted.last()) {
+        (Some(min), Some(max)) => {
+            format!("{min:.4} / {:.4} / {max:.4} (min / median / max)", sorted[sorted.len() / 2])
+        }
+        _ => "none".to_owned(),
+    }
+}
+
+fn avatar_text(stored: &ply::Stored) -> String {
+    let Avatar { gaussians, binding } = &stored.avatar;
+    let binding = match binding {
+        Binding::Static => "none: a static scene".to_owned(),
+        Binding::Vertex(weights) => format!("joint weights, up to {} per Gaussian", weights.max_influences()),
+        Binding::Face(_) => "faces: barycentric coordinates and offset".to_owned(),
+    };
+    let mut text = line("kind", "3DGS PLY") + &line("Gaussians", gaussians.len());
+    text += &line("SH degree", gaussians.sh_degree);
+    text += &line("binding", binding);
+    let low = gaussians.means.iter().copied().reduce(glam::Vec3::min).unwrap_or_default();
+    let high = gaussians.means.iter().copied().reduce(glam::Vec3::max).unwrap_or_default();
+    text += &line("extent, metres", format!("{low:.3} to {high:.3}"));
+    text +=
+        &line("scale, metres", spread(gaussians.log_scales.iter().flat_map(|s| s.map(f32::exp).to_array())));
+    text += &line("opacity", spread(gaussians.opacities()));
+    if let Some(body) = &stored.body {
+        text += &line("body", body);
+    }
+    text + &stored.comments.iter().map(|comment| line("comment", comment)).collect::<String>()
+}
+
+fn body_text(model: &Body) -> String {
+    let rest = &model.rest;
+    let mut text = line("kind", "body model") + &line("vertices", rest.vertices.len());
+    text += &line("faces", rest.faces.len());
+    text += &line("joints", rest.skeleton.num_joints());
+    text += &line("influences", format!("up to {} per vertex", rest.weights.max_influences()));
+    text += &line("shape directions", model.shape.as_ref().map_or(0, |shape| shape.directions.len()));
+    text += &line("pose directions", rest.pose_directions.len());
+    text += &line("texture coordinates", if rest.uv.is_some() { "yes" } else { "no" });
+    let flat = |f: &&[u32; 3]| {
+        let [a, b, c] = f.map(|i| rest.vertices[i as usize]);
+        (b - a).cross(c - a).length() < 1e-14
+    };
+    text += &line("zero-area faces", rest.faces.iter().filter(flat).count());
+    text + &line("joint names", rest.skeleton.names.join(" "))
+}
+
+fn clips_text(path: &Path) -> Result<String> {
+    let clip = |clip: &data::gltf::Clip| {
+        line(&format!("clip {}", clip.name), format!("{} keys", clip.key_times().len()))
+    };
+    Ok(data::gltf::Rig::load(path)?.clips.iter().map(clip).collect())
+}
+
+fn archive_text(path: &Path) -> Result<String> {
+    let mut archive = Archive::open(path, "archive")?;
+    let mut text = line("kind", "npz archive");
+    for name in archive.names() {
+        let header = archive.header(&name)?;
+        text += &line(&name, format!("{:?} {}", header.shape, header.descr));
+    }
+    let has = |name: &str| archive.contains(name);
+    if has("v_template") {
+        return Ok(text + &body_text(&body::load(path)?));
+    }
+    if has("thetas") || has("global_orient") {
+        let track = poses::load(path)?;
+        return Ok(text + &line("poses", track.len()) + &line("betas", format!("{:?}", track.betas)));
+    }
+    if has("intrinsic") || has("K") {
+        return Ok(text + &cameras_text(path)?);
+    }
+    Ok(text)
+}
+
+fn cameras_text(path: &Path) -> Result<String> {
+    let cameras = camera::load(path)?;
+    let describe = |(i, c): (usize, &crate::scene::Camera)| {
+        let centre = format!("centre ({:.1}, {:.1})", c.cx, c.cy);
+        line(
+            &format!("camera {i}"),
+            format!("{}x{}, focal {:.1} {:.1}, {centre}", c.width, c.height, c.fx, c.fy),
+        )
+    };
+    Ok(cameras.iter().enumerate().map(describe).collect())
+}
+
+fn json_text(path: &Path) -> Result<String> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot read", path.display()))?;
+    let value: serde_json::Value =
+        serde_json::from_str(&text).with_context(|| format!("{}: not JSON", path.display()))?;
+    if value.get("schema").is_some() && value.get("tables").is_some() {
+        let results =
+            Results::from_json(&text).map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
+        let mut text = line("kind", "results of a run") + &line("plan", &results.plan);
+        for table in &results.tables {
+            let protocol = format!("{}@{}", table.protocol.id, table.protocol.version);
+            text +=
+                &line(&table.experiment, format!("{} sequences, protocol {protocol}", table.sequences.len()));
+        }
+        return Ok(text + &line("missing scores", results.missing()));
+    }
+    let mut text = line("kind", "cameras") + &cameras_text(path)?;
+    if value.get("poses").is_some() {
+        text += &line("poses", poses::load(path)?.len());
+    }
+    Ok(text)
+}
+
+fn store_text(path: &Path) -> Result<String> {
+    let records = store::read(path)?;
+    let failed =
+        |r: &&crate::experiment::FrameRecord| matches!(r.outcome, crate::experiment::Outcome::Error(_));
+    let failures: Vec<_> = records.values().filter(failed).collect();
+    let mut text = line("kind", "results store") + &line("records", records.len());
+    text += &line("failed", failures.len());
+    for record in failures {
+        if let crate::experiment::Outcome::Error(problem) = &record.outcome {
+            text += &line(&record.label, problem);
+        }
+    }
+    Ok(text)
+}
+
+fn image_text((image, alpha): &(Image, Option<Mask>)) -> String {
+    let mut text = line("kind", "image") + &line("size", format!("{}x{}", image.width(), image.height()));
+    text += &line("values", spread(image.pixels().iter().flatten().copied()));
+    if let Some(alpha) = alpha {
+        text += &line("alpha", spread(alpha.values().iter().copied()));
+    }
+    text
+}
+
+fn folder_text(path: &Path) -> Result<String> {
+    if folder::is_subject(path) {
+        return Ok(line("kind", "subject") + &subject_text(&Subject::load(path, &Options::default())?));
+    }
+    let registry = data::Registry::scan(path)?;
+    let mut text = line("kind", "folder of subjects");
+    for dataset in &registry.datasets {
+        for subject in dataset.load(&Options::default())? {
+            text += &subject_text(&subject);
+        }
+    }
+    Ok(text)
+}
+
+fn subject_text(subject: &Subject) -> String {
+    let mut text =
+        line("subject", &subject.id) + &line("capture", format!("{:?}", subject.capture).to_lowercase());
+    for sequence in subject.sequences() {
+        let (frames, poses, cameras) = (sequence.frames.len(), sequence.poses.len(), sequence.cameras.len());
+        text += &line(&sequence.id, format!("{frames} frames, {poses} poses, {cameras} cameras"));
+    }
+    text
+}

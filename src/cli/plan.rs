@@ -1,0 +1,60 @@
+//! `reproduce plan`: what a run would do.
+
+use super::Exit;
+use super::output::{Format, emit, emit_json};
+use super::planning::{Planned, Planning};
+use crate::experiment::{self, Shard};
+use crate::run::store;
+use anyhow::Result;
+use std::path::PathBuf;
+
+/// Show what a run would do, without doing it.
+///
+/// Prints tables, avatars and frames, and how many of them the results store of --out has already.
+#[derive(Debug, clap::Args)]
+pub(super) struct Plan {
+    #[command(flatten)]
+    planning: Planning,
+    /// Folder of the run
+    #[arg(long, value_name = "DIR", default_value = super::run::DEFAULT_OUT)]
+    out: PathBuf,
+    /// Only this slice of the frames
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// How to print the plan; JSON holds every avatar and every frame with its content key
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+impl Plan {
+    pub(super) fn run(&self) -> Result<Exit> {
+        let Planned { plan, .. } = self.planning.plan()?;
+        match self.format {
+            Format::Json => emit_json(&plan)?,
+            Format::Text => emit(&self.text(&plan)?)?,
+        }
+        Ok(Exit::Success)
+    }
+
+    fn text(&self, plan: &experiment::Plan) -> Result<String> {
+        let mut text = format!("plan {}\n", plan.digest);
+        for (index, table) in plan.tables.iter().enumerate() {
+            let names: Vec<&str> = table.datasets.iter().map(|(_, title)| title.as_str()).collect();
+            let frames = plan.jobs.iter().filter(|job| job.table == index).count();
+            text += &format!(
+                "{}: {} sequences, {} variants, {frames} frames, protocol {}, on {}\n",
+                table.experiment,
+                table.rows.len(),
+                table.variants.len(),
+                table.protocol,
+                if names.is_empty() { "no data".to_owned() } else { names.join(", ") },
+            );
+        }
+        let records = store::merge(super::run::stores(&self.out)?.iter().map(PathBuf::as_path))?;
+        let jobs = plan.shard(self.shard);
+        let left = store::outstanding(jobs.iter().copied(), &records).len();
+        text +=
+            &format!("{} avatars\n{} frames, {left} of them still to do\n", plan.avatars.len(), jobs.len());
+        Ok(text)
+    }
+}

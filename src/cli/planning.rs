@@ -1,0 +1,99 @@
+//! Which experiments, on how much of the data: the arguments of `run` and `plan`.
+
+use super::data::Data;
+use crate::experiment::{self, Experiment, Options, Plan, Profile, Subset};
+use crate::run::Library;
+use anyhow::{Result, bail};
+use std::path::{Path, PathBuf};
+
+/// What to plan.
+#[derive(Debug, clap::Args)]
+pub(super) struct Planning {
+    /// Experiments: ids (see `reproduce list experiments`) or .toml files [default: the six tables]
+    #[arg(value_name = "EXPERIMENT")]
+    experiments: Vec<String>,
+    /// How much of the data to look at: quick (256 pixels, few frames) or standard (everything)
+    #[arg(long, value_name = "P", default_value = "quick", value_parser = profile)]
+    profile: Profile,
+    /// Add a row for every strategy
+    #[arg(long)]
+    all_strategies: bool,
+    /// Only test frames START <= index < END of each sequence
+    #[arg(long, value_name = "START..END", value_parser = range, help_heading = "Subset")]
+    frames: Option<Range>,
+    /// At most N test frames per sequence
+    #[arg(long, value_name = "N", help_heading = "Subset")]
+    limit: Option<usize>,
+    /// Only this subject (may be repeated)
+    #[arg(long = "subject", value_name = "ID", help_heading = "Subset")]
+    subjects: Vec<String>,
+    /// Only this variant (may be repeated)
+    #[arg(long = "variant", value_name = "ID", help_heading = "Subset")]
+    variants: Vec<String>,
+    #[command(flatten)]
+    data: Data,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Range([usize; 2]);
+
+/// A plan and all that it was made from.
+pub(super) struct Planned {
+    pub(super) plan: Plan,
+    pub(super) experiments: Vec<Experiment>,
+    pub(super) library: Library,
+}
+
+impl Planning {
+    /// Loads experiments and data, and plans.
+    pub(super) fn plan(&self) -> Result<Planned> {
+        let experiments = self.experiments()?;
+        let library = self.data.library(&experiments)?;
+        let subset = Subset {
+            frames: self.frames.map(|Range(range)| range),
+            limit: self.limit,
+            subjects: self.subjects.clone(),
+            variants: self.variants.clone(),
+        };
+        let options = Options { profile: self.profile.clone(), subset };
+        let plan = experiment::plan(&experiments, &library.describe()?, &options)?;
+        Ok(Planned { plan, experiments, library })
+    }
+
+    fn experiments(&self) -> Result<Vec<Experiment>> {
+        let known = known_experiments()?;
+        let mut chosen = Vec::new();
+        for name in &self.experiments {
+            if Path::new(name).extension().is_some_and(|e| e == "toml") {
+                chosen.push(Experiment::load(Path::new(name))?);
+                continue;
+            }
+            let Some(experiment) = known.iter().find(|e| e.id == *name) else {
+                let ids: Vec<&str> = known.iter().map(|e| e.id.as_str()).collect();
+                bail!("experiment `{name}`; expected a .toml file or one of {}", ids.join(", "));
+            };
+            chosen.push(experiment.clone());
+        }
+        let chosen = if chosen.is_empty() { Experiment::embedded() } else { chosen };
+        let extend = self.all_strategies;
+        Ok(if extend { chosen.iter().map(Experiment::with_all_strategies).collect() } else { chosen })
+    }
+}
+
+/// The experiments of `experiments/` in this folder, if there is one; else those that are built in.
+pub(super) fn known_experiments() -> Result<Vec<Experiment>> {
+    let folder = PathBuf::from("experiments");
+    Ok(if folder.is_dir() { Experiment::load_folder(&folder)? } else { Experiment::embedded() })
+}
+
+fn profile(id: &str) -> Result<Profile, String> {
+    Profile::preset(id).ok_or_else(|| format!("expected one of {}", Profile::IDS.join(", ")))
+}
+
+fn range(text: &str) -> Result<Range, String> {
+    let ends = text.split_once("..").and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
+    match ends {
+        Some([start, end]) if start < end => Ok(Range([start, end])),
+        _ => Err("expected START..END with START < END, such as 0..10".to_owned()),
+    }
+}

@@ -1,0 +1,118 @@
+//! `reproduce report`: the tables of a run again, or against a baseline.
+
+use super::output::{emit, emit_json};
+use super::{Context, Exit};
+use crate::report::compare::{Changes, Move, Tolerances, compare};
+use crate::report::{self, Results};
+use anyhow::{Context as _, Result, anyhow};
+use std::path::{Path, PathBuf};
+
+/// Print the tables of a run again, or compare them with a baseline.
+///
+/// With --baseline the exit code is 1 if a sequence got worse by more than the tolerances.
+#[derive(Debug, clap::Args)]
+pub(super) struct Report {
+    /// Folder of a run, or its results.json
+    #[arg(value_name = "RUN", default_value = super::run::DEFAULT_OUT)]
+    run: PathBuf,
+    /// How to print the tables
+    #[arg(long, value_enum, default_value_t)]
+    format: TableFormat,
+    /// Only this table
+    #[arg(long, value_name = "EXPERIMENT")]
+    table: Option<String>,
+    /// Folder of an earlier run, or its results.json: print what moved
+    #[arg(long, value_name = "RUN", help_heading = "Comparison")]
+    baseline: Option<PathBuf>,
+    /// PSNR that may be lost, dB
+    #[arg(long, value_name = "DB", default_value_t = Tolerances::default().psnr, help_heading = "Comparison")]
+    tolerance_psnr: f64,
+    /// SSIM that may be lost
+    #[arg(long, value_name = "X", default_value_t = Tolerances::default().ssim, help_heading = "Comparison")]
+    tolerance_ssim: f64,
+    /// LPIPS that may be gained
+    #[arg(long, value_name = "X", default_value_t = Tolerances::default().lpips, help_heading = "Comparison")]
+    tolerance_lpips: f64,
+}
+
+/// A form of the tables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+enum TableFormat {
+    /// Markdown, as in tables.md.
+    #[default]
+    Markdown,
+    /// Comma-separated values.
+    Csv,
+    /// JSON: the tables alone, without frames.
+    Json,
+    /// LaTeX.
+    Latex,
+}
+
+impl Report {
+    pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        let mut results = load(&self.run)?;
+        if let Some(id) = &self.table {
+            let known: Vec<String> = results.tables.iter().map(|table| table.experiment.clone()).collect();
+            results.tables.retain(|table| table.experiment == *id);
+            if results.tables.is_empty() {
+                return Err(anyhow!("--table {id}; expected one of {}", known.join(", ")));
+            }
+        }
+        if let Some(baseline) = &self.baseline {
+            return self.compare(&load(baseline)?, &results, context);
+        }
+        let tables = results.tables.iter().map(|table| &table.table);
+        match self.format {
+            TableFormat::Markdown => emit(&report::page(&results))?,
+            TableFormat::Csv => emit(&tables.map(report::csv).collect::<Vec<_>>().join("\n"))?,
+            TableFormat::Latex => emit(&tables.map(report::latex).collect::<Vec<_>>().join("\n"))?,
+            TableFormat::Json => emit_json(&tables.collect::<Vec<_>>())?,
+        }
+        Ok(if results.missing() > 0 { Exit::Incomplete } else { Exit::Success })
+    }
+
+    fn compare(&self, baseline: &Results, candidate: &Results, context: Context) -> Result<Exit> {
+        let tolerances = Tolerances {
+            psnr: self.tolerance_psnr,
+            ssim: self.tolerance_ssim,
+            lpips: self.tolerance_lpips,
+            ..Tolerances::default()
+        };
+        let changes = compare(baseline, candidate, &tolerances);
+        match self.format {
+            TableFormat::Json => emit_json(&changes)?,
+            _ => emit(&text(&changes))?,
+        }
+        context.note(format!("{} sequences and variants compared", changes.compared));
+        Ok(if changes.verdict.is_good() { Exit::Success } else { Exit::Failed })
+    }
+}
+
+/// Frames of a comparison that are worth a line.
+const FRAMES_SHOWN: usize = 10;
+
+fn text(changes: &Changes) -> String {
+    let line = |m: &Move| format!("  {} {}: {} -> {}\n", m.at, m.metric.id(), m.baseline, m.candidate);
+    let mut text = format!("verdict: {:?}\n", changes.verdict).to_lowercase();
+    for (title, moves) in [
+        ("sequences that moved", &changes.sequences[..]),
+        ("frames that moved most", &changes.frames[..changes.frames.len().min(FRAMES_SHOWN)]),
+    ] {
+        if !moves.is_empty() {
+            text += &format!("{title}:\n{}", moves.iter().map(line).collect::<String>());
+        }
+    }
+    for (title, names) in [("lost", &changes.lost), ("new", &changes.gained)] {
+        if !names.is_empty() {
+            text += &format!("{title}: {}\n", names.join(", "));
+        }
+    }
+    text
+}
+
+fn load(path: &Path) -> Result<Results> {
+    let file = if path.is_dir() { path.join("results.json") } else { path.to_owned() };
+    let text = std::fs::read_to_string(&file).with_context(|| format!("{}: cannot read", file.display()))?;
+    Results::from_json(&text).map_err(|problem| anyhow!("{}: {problem}", file.display()))
+}

@@ -1,0 +1,132 @@
+//! `reproduce run`: the main job.
+
+use super::output::emit;
+use super::planning::{Planned, Planning};
+use super::{Context, Exit, progress::Watch};
+use crate::data::atomic;
+use crate::experiment::{Records, Shard};
+use crate::report;
+use crate::run::provenance::Provenance;
+use crate::run::store::{self, FILE_NAME, Store};
+use crate::run::{self, Error};
+use anyhow::{Context as _, Result};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Where a run goes unless told otherwise.
+pub(super) const DEFAULT_OUT: &str = "runs/default";
+
+/// Evaluate: make avatars, pose, render, score, and write the tables.
+///
+/// Writes tables.md, one .csv and .tex per table, results.json (see reports/SCHEMA.md) and run.json (who, when, how
+/// fast). frames.jsonl remembers every frame by its content: a run that is killed goes on where it stopped, and a run with
+/// other settings redoes only what they change. Slices (--shard) write results of their own; when all are done, run again
+/// without --shard to collect them.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Run {
+    #[command(flatten)]
+    planning: Planning,
+    /// Folder to write to
+    #[arg(long, value_name = "DIR", default_value = DEFAULT_OUT)]
+    out: PathBuf,
+    /// Only this slice of the frames, counted from 1
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Forget what the folder's results store knows
+    #[arg(long, conflicts_with = "shard")]
+    fresh: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce run                                  all six tables on built-in data
+  reproduce run table3 --all-strategies          one table, a row per strategy
+  reproduce run --data DIR --profile standard    all tables on the subjects of a folder
+  reproduce run my.toml --out runs/mine          a table of your own";
+
+impl Run {
+    pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        let start = Instant::now();
+        let planned = self.planning.plan()?;
+        let mut provenance = Provenance::starting(&planned.plan.digest);
+        make_folder(&self.out)?;
+        if self.fresh {
+            for path in stores(&self.out)? {
+                std::fs::remove_file(&path).with_context(|| format!("{}: cannot remove", path.display()))?;
+            }
+        }
+        provenance.frames_rendered = self.execute(&planned, context)?;
+        provenance.frames_planned = planned.plan.jobs.len();
+        provenance.seconds = start.elapsed().as_secs_f64();
+        if self.shard.is_some() {
+            return Ok(Exit::Success);
+        }
+        self.write(&planned, &provenance, context)
+    }
+
+    /// Renders what is left to do; says how many frames that were.
+    fn execute(&self, Planned { plan, library, .. }: &Planned, context: Context) -> Result<usize> {
+        let name = self.shard.map_or_else(|| FILE_NAME.to_owned(), Shard::file_name);
+        let known = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
+        let left = store::outstanding(plan.shard(self.shard), &known);
+        let mut store = Store::open(&self.out.join(name), &plan.digest)?;
+        let watch = Watch::new(context.quiet);
+        run::execute(plan, &left, library, &self.out.join("avatars"), &mut store, &|event| watch.see(event))?;
+        Ok(left.len())
+    }
+
+    /// The tables, from every record in the folder.
+    fn write(&self, planned: &Planned, provenance: &Provenance, context: Context) -> Result<Exit> {
+        let records: Records = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
+        let results = report::results(&planned.plan, &planned.experiments, &records)?;
+        write_results(&self.out, &results)?;
+        write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
+        emit(&report::page(&results))?;
+        let out = self.out.display();
+        context.note(format!("{out}: tables.md, results.json and more, in {:.1} s", provenance.seconds));
+        let missing = results.missing();
+        if missing > 0 {
+            context.note(format!("{missing} scores are missing; {out}/{FILE_NAME} says why"));
+            return Ok(Exit::Incomplete);
+        }
+        Ok(if planned.plan.jobs.is_empty() { Exit::Incomplete } else { Exit::Success })
+    }
+}
+
+/// The results stores of a run's folder, sorted.
+pub(super) fn stores(folder: &Path) -> Result<Vec<PathBuf>> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let context = || format!("{}: cannot list the folder", folder.display());
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(context)? {
+        let path = entry.with_context(context)?.path();
+        if path.extension().is_some_and(|e| e == "jsonl") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}
+
+/// Every form of the tables.
+pub(super) fn write_results(folder: &Path, results: &report::Results) -> Result<()> {
+    write_text(&folder.join("tables.md"), &report::page(results))?;
+    write_text(&folder.join("results.json"), &results.to_json())?;
+    for table in &results.tables {
+        write_text(&folder.join(format!("{}.csv", table.experiment)), &report::csv(&table.table))?;
+        write_text(&folder.join(format!("{}.tex", table.experiment)), &report::latex(&table.table))?;
+    }
+    Ok(())
+}
+
+fn write_text(path: &Path, text: &str) -> Result<()> {
+    Ok(atomic::write(path, |w| w.write_all(text.as_bytes()))?)
+}
+
+fn make_folder(folder: &Path) -> Result<()> {
+    Ok(std::fs::create_dir_all(folder).map_err(|source| Error::Folder { path: folder.to_owned(), source })?)
+}
