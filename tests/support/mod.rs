@@ -1,5 +1,5 @@
 //! Paths shared by the integration tests.
-#![allow(dead_code, reason = "each test binary uses a part of this module")]
+#![allow(dead_code, unreachable_pub, reason = "each test binary uses a part of this module")]
 
 use std::path::PathBuf;
 
