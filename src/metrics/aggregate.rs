@@ -91,3 +91,54 @@ impl Protocol {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::PsnrVariant;
+
+    fn frame(protocol: &Protocol, pixels: u64, mse: f64, lpips: Option<f64>) -> FrameScore {
+        let channel_mse = [mse; 3];
+        let psnr = PsnrVariant::Image.psnr(channel_mse);
+        FrameScore { protocol: protocol.key(), pixels, channel_mse, mse, psnr, ssim: 1.0 - mse, lpips }
+    }
+
+    #[test]
+    fn mean_of_frames_and_pooled() {
+        for (id, pooled) in [("default", false), ("haha", true)] {
+            let protocol = Protocol::preset(id).unwrap();
+            let frames = [frame(protocol, 300, 0.01, Some(0.25)), frame(protocol, 100, 0.0001, Some(0.75))];
+            let summary = protocol.aggregate(&frames).unwrap();
+            let mse = (3.0 * 0.01 + 0.0001) / 4.0;
+            assert!((summary.mse - mse).abs() < 1e-15);
+            assert!((summary.psnr_mean_of_frames - 30.0).abs() < 1e-12);
+            assert!((summary.psnr_pooled - -10.0 * mse.log10()).abs() < 1e-12);
+            let chosen = if pooled { summary.psnr_pooled } else { summary.psnr_mean_of_frames };
+            assert_eq!(summary.psnr, chosen);
+            assert!((summary.ssim - 0.99495).abs() < 1e-12);
+            assert_eq!((summary.frames, summary.pixels, summary.lpips), (2, 400, Some(0.5)));
+        }
+    }
+
+    #[test]
+    fn a_missing_lpips_is_not_averaged_and_identical_frames_show() {
+        let protocol = Protocol::default();
+        let frames = [frame(&protocol, 10, 0.0, Some(0.0)), frame(&protocol, 10, 0.1, None)];
+        let summary = protocol.aggregate(&frames).unwrap();
+        assert_eq!((summary.lpips, summary.identical_frames), (None, 1));
+        assert_eq!(summary.psnr, f64::INFINITY);
+        assert!((summary.psnr_pooled - -10.0 * 0.05f64.log10()).abs() < 1e-12);
+        let text = serde_json::to_string(&summary).unwrap();
+        assert_eq!(serde_json::from_str::<Summary>(&text).unwrap(), summary);
+    }
+
+    #[test]
+    fn frames_of_another_protocol_are_refused() {
+        let (protocol, other) = (Protocol::default(), Protocol::preset("haha").unwrap());
+        let frames = [frame(&protocol, 10, 0.1, None), frame(other, 10, 0.1, None)];
+        let error = protocol.aggregate(&frames).unwrap_err().to_string();
+        let expected = "frame 1: scored under protocol \"haha\" version 1; expected \"avatar-v1\" version 1";
+        assert_eq!(error, expected);
+        assert!(protocol.aggregate(&[]).is_err());
+    }
+}

@@ -1,5 +1,6 @@
 //! Scoring protocols: every choice behind a number, named and versioned, as data.
 
+use super::planes::floor;
 use super::{LpipsVariant, MetricsError, PsnrVariant, Region, SsimVariant};
 use crate::metrics::Aggregation;
 use serde::{Deserialize, Serialize};
@@ -215,26 +216,121 @@ fn value_of(text: &str) -> toml::Value {
 }
 
 impl Clamp {
-    /// The value after clamping.
+    /// Clamps values in place.
     #[inline(always)]
-    pub(crate) fn apply(self, value: f64) -> f64 {
+    pub(crate) fn apply(self, values: &mut [f64]) {
         match self {
-            Self::None => value,
-            Self::MaxOne => value.min(1.0),
-            Self::Unit => value.clamp(0.0, 1.0),
+            Self::None => (),
+            Self::MaxOne => values.iter_mut().for_each(|v| *v = v.min(1.0)),
+            Self::Unit => values.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0)),
         }
     }
 }
 
 impl Quantisation {
-    /// The value after the way to 8 bit and back.
+    /// Takes values to 8 bit and back in place.
     #[inline(always)]
-    pub(crate) fn apply(self, value: f64) -> f64 {
+    pub(crate) fn apply(self, values: &mut [f64]) {
         let offset = match self {
-            Self::None => return value,
+            Self::None => return,
             Self::Round8 => 0.5,
             Self::Trunc8 => 1e-9, // k / 255 * 255 may fall short of k by a rounding
         };
-        f64::from((value.clamp(0.0, 1.0) * 255.0 + offset) as i32) / 255.0
+        values.iter_mut().for_each(|v| *v = floor(v.clamp(0.0, 1.0) * 255.0 + offset) / 255.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_sound_and_unique() {
+        let expected = [
+            "avatar-v1",
+            "hugs-human",
+            "hugs-full",
+            "ihuman",
+            "splattingavatar",
+            "animatable-ps",
+            "animatable-gala",
+            "haha",
+            "3dgs",
+            "nerfbaselines",
+            "gauhuman",
+            "3dgs-avatar",
+            "3dgs-avatar-zju",
+        ];
+        let ids: Vec<&str> = PROTOCOLS.iter().map(|protocol| protocol.id.as_str()).collect();
+        assert_eq!(ids, expected);
+        for protocol in PROTOCOLS.iter() {
+            protocol.check().unwrap();
+            let text = toml::to_string(protocol).unwrap();
+            assert_eq!(&toml::from_str::<Protocol>(&text).unwrap(), protocol);
+            assert_eq!(&Protocol::parse(&protocol.id).unwrap(), protocol);
+        }
+        assert_eq!(Protocol::preset("default"), Some(&Protocol::default()));
+        assert_eq!(Protocol::preset("ihuman").unwrap().ssim, SsimVariant::Reflect);
+    }
+
+    #[test]
+    fn specifications_vary_a_preset() {
+        let varied = Protocol::parse("haha+ssim=torchmetrics-1.4+background=[0, 0.5, 1]+mask_threshold=0.25");
+        let varied = varied.unwrap();
+        assert_eq!(varied.id, "haha+ssim=torchmetrics-1.4+background=[0, 0.5, 1]+mask_threshold=0.25");
+        assert_eq!(varied.ssim, SsimVariant::Valid);
+        assert_eq!(varied.background_colour(), Some([0.0, 0.5, 1.0]));
+        assert_eq!(varied.aggregate, Aggregation::PooledMse);
+        let captured = Protocol::parse("default+background=captured").unwrap();
+        assert_eq!(captured.background_colour(), None);
+        for wrong in [
+            "",
+            "nosuch",
+            "haha+",
+            "haha+ssim",
+            "haha+ssim=nosuch",
+            "haha+id=x",
+            "haha+version=2",
+            "haha+background=[0, 0]",
+            "haha+background=[0, 0, nan]",
+            "haha+mask_threshold=0",
+            "haha+lpips=alex",
+        ] {
+            let error = Protocol::parse(wrong).unwrap_err();
+            assert!(matches!(&error, MetricsError::Protocol { id, .. } if id == wrong), "{wrong}: {error}");
+            assert!(!error.to_string().contains('\n'), "{error}");
+        }
+    }
+
+    #[test]
+    fn quantisation_keeps_levels() {
+        for k in 0..=255u8 {
+            for quantise in [Quantisation::Round8, Quantisation::Trunc8] {
+                let mut value = [f64::from(k) / 255.0];
+                quantise.apply(&mut value);
+                assert_eq!(value[0], f64::from(k) / 255.0, "{quantise:?} {k}");
+            }
+        }
+        let between = [100.49, 100.5, 100.99].map(|v| v / 255.0);
+        let (mut rounded, mut truncated) = (between, between);
+        Quantisation::Round8.apply(&mut rounded);
+        Quantisation::Trunc8.apply(&mut truncated);
+        assert_eq!(rounded, [100.0, 101.0, 101.0].map(|v| v / 255.0));
+        assert_eq!(truncated, [100.0 / 255.0; 3]);
+        let mut outside = [-0.2, 1.7];
+        Quantisation::Round8.apply(&mut outside);
+        assert_eq!(outside, [0.0, 1.0]);
+    }
+
+    #[test]
+    fn clamps() {
+        let clamped = |clamp: Clamp| {
+            let mut values = [-0.5, 0.5, 1.5];
+            clamp.apply(&mut values);
+            values
+        };
+        assert_eq!(clamped(Clamp::None), [-0.5, 0.5, 1.5]);
+        assert_eq!(clamped(Clamp::MaxOne), [-0.5, 0.5, 1.0]);
+        assert_eq!(clamped(Clamp::Unit), [0.0, 0.5, 1.0]);
     }
 }

@@ -92,34 +92,31 @@ pub(crate) fn mean(channels: [f64; 3]) -> f64 {
 /// the additions is too.
 pub(crate) const LANES: usize = 16;
 
-/// Σ value(i) for i in 0..n, in [`LANES`] interleaved partial sums.
+/// Σ value(row0\[i\], row1\[i\], ...) over rows of equal length, in [`LANES`] interleaved partial sums.
 #[inline(always)]
-pub(crate) fn lane_sum(n: usize, value: impl Fn(usize) -> f64) -> f64 {
+pub(crate) fn lane_sum<const N: usize>(rows: [&[f64]; N], value: impl Fn([f64; N]) -> f64) -> f64 {
+    let split = rows.map(|row| row.as_chunks::<LANES>());
     let mut lanes = [0.0; LANES];
-    let whole = n - n % LANES;
-    for start in (0..whole).step_by(LANES) {
-        for (lane, sum) in lanes.iter_mut().enumerate() {
-            *sum += value(start + lane);
+    for chunk in 0..split[0].0.len() {
+        let chunks = split.map(|(chunks, _)| &chunks[chunk]);
+        for lane in 0..LANES {
+            lanes[lane] += value(chunks.map(|values| values[lane]));
         }
     }
-    for i in whole..n {
-        lanes[i - whole] += value(i);
+    for lane in 0..split[0].1.len() {
+        lanes[lane] += value(split.map(|(_, rest)| rest[lane]));
     }
     lanes.iter().sum()
 }
 
 fn row_sums(a: &[f64], b: &[f64], weights: Option<&[f64]>) -> (f64, f64) {
-    let n = a.len().min(b.len());
-    let (a, b) = (&a[..n], &b[..n]);
+    let square = |a: f64, b: f64| (a - b) * (a - b);
     match weights {
-        None => (lane_sum(n, |i| (a[i] - b[i]) * (a[i] - b[i])), lane_sum(n, |i| (a[i] - b[i]).abs())),
-        Some(weights) => {
-            let w = &weights[..n];
-            (
-                lane_sum(n, |i| w[i] * (a[i] - b[i]) * (a[i] - b[i])),
-                lane_sum(n, |i| w[i] * (a[i] - b[i]).abs()),
-            )
-        }
+        None => (lane_sum([a, b], |[a, b]| square(a, b)), lane_sum([a, b], |[a, b]| (a - b).abs())),
+        Some(w) => (
+            lane_sum([a, b, w], |[a, b, w]| w * square(a, b)),
+            lane_sum([a, b, w], |[a, b, w]| w * (a - b).abs()),
+        ),
     }
 }
 
@@ -139,8 +136,9 @@ mod tests {
 
     #[test]
     fn lane_sums_reach_every_value() {
-        for n in 0..70 {
-            assert_eq!(lane_sum(n, |i| i as f64), (n * n.saturating_sub(1) / 2) as f64);
+        for n in 0..70usize {
+            let row: Vec<f64> = (0..n).map(|i| i as f64).collect();
+            assert_eq!(lane_sum([&row, &row], |[a, b]| a + b), (n * n.saturating_sub(1)) as f64);
         }
     }
 }

@@ -132,14 +132,23 @@ impl Protocol {
             _ => None,
         };
         let outside = self.outside(truth.mask(), background)?;
-        let finish =
-            |i: usize, rgb: [f64; 3]| outside.apply(i, rgb.map(|v| self.quantise.apply(self.clamp.apply(v))));
-        let composite = |i: usize, rgb: [f64; 3]| match alpha {
-            None => rgb,
-            Some(alpha) => blend(rgb, background, exact_level(alpha[i])),
+        let width = render.width();
+        let finish = |y: usize, rgb: [&mut [f64]; 3]| {
+            for (c, values) in rgb.into_iter().enumerate() {
+                self.clamp.apply(values);
+                self.quantise.apply(values);
+                outside.apply(y * width, c, values);
+            }
         };
-        let render = Planes::mapped(render, "render", finish)?;
-        let rgb = Planes::mapped(rgb, "truth", |i, rgb| finish(i, composite(i, rgb)))?;
+        let render = Planes::by_rows(render, "render", finish)?;
+        let rgb = Planes::by_rows(rgb, "truth", |y, mut rgb| {
+            if let Some(alpha) = alpha {
+                for (values, background) in rgb.iter_mut().zip(background) {
+                    composite(values, &alpha[y * width..], background);
+                }
+            }
+            finish(y, rgb);
+        })?;
         self.cut(render, rgb, truth.mask())
     }
 
@@ -193,24 +202,32 @@ enum Outside<'a> {
 }
 
 impl Outside<'_> {
+    /// Changes values of channel `channel`, the first of which belongs to pixel `start`.
     #[inline(always)]
-    fn apply(&self, i: usize, rgb: [f64; 3]) -> [f64; 3] {
+    fn apply(&self, start: usize, channel: usize, values: &mut [f64]) {
         match *self {
-            Self::Kept => rgb,
-            Self::Scaled { mask } => rgb.map(|v| v * exact_level(mask[i])),
+            Self::Kept => (),
+            Self::Scaled { mask } => {
+                for (value, &mask) in values.iter_mut().zip(&mask[start..]) {
+                    *value *= exact_level(mask);
+                }
+            }
             Self::Filled { mask, threshold, colour } => {
-                if mask[i] >= threshold {
-                    rgb
-                } else {
-                    colour
+                for (value, &mask) in values.iter_mut().zip(&mask[start..]) {
+                    *value = if mask >= threshold { *value } else { colour[channel] };
                 }
             }
         }
     }
 }
 
-fn blend(rgb: [f64; 3], background: [f64; 3], alpha: f64) -> [f64; 3] {
-    std::array::from_fn(|c| rgb[c] * alpha + background[c] * (1.0 - alpha))
+/// `v a + background (1 - a)`.
+#[inline(always)]
+fn composite(values: &mut [f64], alpha: &[f32], background: f64) {
+    for (value, &alpha) in values.iter_mut().zip(alpha) {
+        let alpha = exact_level(alpha);
+        *value = *value * alpha + background * (1.0 - alpha);
+    }
 }
 
 /// +inf as `null`.
@@ -224,5 +241,159 @@ pub(crate) mod infinite_as_null {
 
     pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
         Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::LpipsVariant;
+
+    const SIZE: usize = 24;
+
+    /// A gradient plus a constant per channel.
+    fn gradient(offset: [f32; 3]) -> Image {
+        let pixel = |i: usize| offset.map(|o| o + 0.2 * (i % SIZE) as f32 / SIZE as f32);
+        Image::new(SIZE, SIZE, (0..SIZE * SIZE).map(pixel).collect()).unwrap()
+    }
+
+    fn left_half() -> Mask {
+        let value = |i: usize| f32::from(u8::from(i % SIZE < SIZE / 2));
+        Mask::new(SIZE, SIZE, (0..SIZE * SIZE).map(value).collect()).unwrap()
+    }
+
+    fn protocol(changes: &str) -> Protocol {
+        Protocol::parse(&format!("default+quantise=none{changes}")).unwrap()
+    }
+
+    #[test]
+    fn a_straight_truth_is_composited_over_the_background() {
+        let (truth, alpha) = (gradient([0.3; 3]), left_half());
+        let render = truth.composited(&alpha, [1.0; 3]).unwrap();
+        let straight = Truth::Straight { rgb: &truth, alpha: &alpha };
+        let score = protocol("").score(&render, straight).unwrap();
+        assert!(score.mse < 1e-15 && (score.ssim - 1.0).abs() < 1e-9, "{score:?}");
+        let captured = protocol("+background=captured").score(&render, straight).unwrap();
+        assert!(captured.mse > 0.1);
+        assert_eq!(protocol("+background=captured").score(&truth, straight).unwrap().psnr, f64::INFINITY);
+    }
+
+    #[test]
+    fn regions_choose_pixels() {
+        let (render, truth) = (gradient([0.4, 0.3, 0.3]), gradient([0.3; 3]));
+        // The render is off by 0.1 in red everywhere, and by 0.3 in blue where the mask is 0.
+        let mask = left_half();
+        let mut render = render;
+        for (pixel, &inside) in render.pixels_mut().iter_mut().zip(mask.values()) {
+            pixel[2] += 0.3 * (1.0 - inside);
+        }
+        let score = |region: &str| {
+            let truth = Truth::Composited { rgb: &truth, mask: Some(&mask) };
+            protocol(&format!("+region={region}")).score(&render, truth).unwrap()
+        };
+        let close = |score: FrameScore, pixels: u64, mse: [f64; 3]| {
+            assert_eq!(score.pixels, pixels);
+            for c in 0..3 {
+                assert!((score.channel_mse[c] - mse[c]).abs() < 1e-7, "{score:?}");
+            }
+        };
+        close(score("full"), 576, [0.01, 0.0, 0.045]);
+        close(score("mask"), 288, [0.01, 0.0, 0.0]);
+        close(score("mask-bounding-box"), 288, [0.01, 0.0, 0.0]);
+        close(score("mask-bounding-box-exclusive"), 23 * 11, [0.01, 0.0, 0.0]);
+        close(score("image-times-mask"), 576, [0.005, 0.0, 0.0]);
+        close(score("background-outside-mask"), 576, [0.005, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn bad_input_is_named() {
+        let (image, mask) = (gradient([0.3; 3]), left_half());
+        let small = Image::filled(SIZE, 10, [0.5; 3]);
+        let truth = Truth::Composited { rgb: &image, mask: None };
+        let message = |result: Result<FrameScore, MetricsError>| result.unwrap_err().to_string();
+        let plain = protocol("");
+        assert_eq!(
+            message(plain.score(&small, truth)),
+            "truth: 24x24 pixels; expected 24x10, the size of the render"
+        );
+        let wide = Mask::filled(SIZE + 1, SIZE, 1.0);
+        let wrong_alpha = Truth::Straight { rgb: &image, alpha: &wide };
+        assert_eq!(
+            message(plain.score(&image, wrong_alpha)),
+            "alpha: 25x24 pixels; expected 24x24, the size of the render"
+        );
+        let small_truth = Truth::Composited { rgb: &small, mask: None };
+        assert_eq!(
+            message(plain.score(&small, small_truth)),
+            "ssim_valid: the scored image has 24x10 pixels; expected at least 11x11"
+        );
+        let mut broken = image.clone();
+        broken.pixels_mut()[SIZE + 2][1] = f32::NAN;
+        assert_eq!(
+            message(plain.score(&broken, truth)),
+            "render: NaN in channel 1 at x 2, y 1; expected a finite value"
+        );
+        let masked = protocol("+region=mask");
+        assert_eq!(
+            message(masked.score(&image, truth)),
+            "mask: none given; expected one, for region \"mask\""
+        );
+        let empty = Mask::filled(SIZE, SIZE, 0.25);
+        for region in ["mask", "mask-bounding-box"] {
+            let truth = Truth::Composited { rgb: &image, mask: Some(&empty) };
+            let error = protocol(&format!("+region={region}")).score(&image, truth).unwrap_err();
+            assert!(matches!(error, MetricsError::EmptyRegion { .. }), "{error}");
+        }
+        let mut corner = Mask::filled(SIZE, SIZE, 0.0);
+        corner.values_mut()[0] = 1.0;
+        let truth = Truth::Composited { rgb: &image, mask: Some(&corner) };
+        let error = masked.score(&image, truth).unwrap_err();
+        assert!(matches!(error, MetricsError::NoCoveredPixel { .. }), "{error}");
+        let mut holed = mask;
+        holed.values_mut()[5] = f32::INFINITY;
+        let truth = Truth::Straight { rgb: &image, alpha: &holed };
+        assert_eq!(
+            message(plain.score(&image, truth)),
+            "alpha: inf in channel 0 at x 5, y 0; expected a finite value"
+        );
+    }
+
+    #[test]
+    fn records_keep_infinity_and_absence() {
+        let image = gradient([0.3; 3]);
+        let score = protocol("").score(&image, Truth::Composited { rgb: &image, mask: None }).unwrap();
+        let text = serde_json::to_string(&score).unwrap();
+        assert!(text.contains("\"psnr\":null") && text.contains("\"lpips\":null"), "{text}");
+        let read: FrameScore = serde_json::from_str(&text).unwrap();
+        assert_eq!((read.psnr, &read), (f64::INFINITY, &score));
+        let without = text.replace("\"psnr\":null,", "");
+        assert!(serde_json::from_str::<FrameScore>(&without).is_err(), "a missing PSNR is not +inf");
+    }
+
+    struct MeanDifference;
+
+    impl PerceptualDistance for MeanDifference {
+        fn distance(
+            &self,
+            render: &Planes,
+            truth: &Planes,
+            variant: LpipsVariant,
+        ) -> Result<f64, MetricsError> {
+            assert_eq!(variant.id(), "alex-pm1");
+            Ok(ErrorSums::new(render, truth, None)?.mae())
+        }
+    }
+
+    #[test]
+    fn a_scorer_fills_lpips_with_the_prepared_images() {
+        let (render, truth, mask) = (gradient([0.4; 3]), gradient([0.3; 3]), left_half());
+        let truth = Truth::Composited { rgb: &truth, mask: Some(&mask) };
+        let lpips = |changes: &str| {
+            protocol(changes).score_with(&render, truth, Some(&MeanDifference)).unwrap().lpips
+        };
+        assert!((lpips("").unwrap() - 0.1).abs() < 1e-7);
+        assert!((lpips("+region=image-times-mask").unwrap() - 0.05).abs() < 1e-7);
+        assert_eq!(lpips("+region=mask"), None);
+        assert_eq!(protocol("").score(&render, truth).unwrap().lpips, None);
     }
 }

@@ -84,14 +84,15 @@ impl<'a> Comparison<'a> {
     ) -> Result<Self, MetricsError> {
         MetricsError::check_size("truth", (b.width(), b.height()), (a.width(), a.height()))?;
         settings.check()?;
-        if let Some(weights) = weights
-            && (settings.downsample || weights.len() != a.pixels())
-        {
-            return Err(MetricsError::Settings {
-                field: "weights",
-                problem: format!("{} of them", weights.len()),
-                expected: "one per pixel, and no downsampling",
-            });
+        let bad = |field, problem, expected| Err(MetricsError::Settings { field, problem, expected });
+        match weights {
+            Some(_) if settings.downsample => {
+                return bad("downsample", "with weights".to_owned(), "no weights, as pixels are merged");
+            }
+            Some(weights) if weights.len() != a.pixels() => {
+                return bad("weights", format!("{} of them", weights.len()), "one per pixel");
+            }
+            _ => (),
         }
         let range = match settings.data_range {
             DataRange::Fixed(range) => range,

@@ -106,7 +106,7 @@ impl SsimSettings {
     pub(super) fn check(&self) -> Result<(), MetricsError> {
         let bad = |field, problem: String, expected| Err(MetricsError::Settings { field, problem, expected });
         let size = self.window.size();
-        if size % 2 == 0 || !(3..=255).contains(&size) {
+        if size.is_multiple_of(2) || !(3..=255).contains(&size) {
             return bad("window.size", format!("{size}"), "an odd number from 3 to 255");
         }
         if let WindowShape::Gaussian { sigma, .. } = self.window
@@ -211,5 +211,43 @@ impl SsimVariant {
             }
             Self::ValidDownsampled => SsimSettings { downsample: true, ..gaussian(Border::Valid) },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_without_meaning_are_named() {
+        let good = SsimVariant::Valid.settings();
+        assert_eq!(good.check(), Ok(()));
+        let gaussian = |size, sigma| WindowShape::Gaussian { size, sigma, precision: Precision::F64 };
+        for (settings, field) in [
+            (SsimSettings { window: WindowShape::Uniform { size: 8 }, ..good }, "window.size"),
+            (SsimSettings { window: WindowShape::Uniform { size: 1 }, ..good }, "window.size"),
+            (SsimSettings { window: gaussian(11, 0.0), ..good }, "window.sigma"),
+            (SsimSettings { window: gaussian(11, f64::NAN), ..good }, "window.sigma"),
+            (SsimSettings { data_range: DataRange::Fixed(0.0), ..good }, "data_range"),
+        ] {
+            let error = settings.check().unwrap_err();
+            assert!(
+                matches!(error, MetricsError::Settings { field: found, .. } if found == field),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn names_are_unique_and_torchmetrics_is_pinned() {
+        let names = SsimVariant::ALL.map(|variant| serde_json::to_string(&variant).unwrap());
+        let ids = SsimVariant::ALL.map(SsimVariant::id);
+        for i in 0..names.len() {
+            assert!(!names[..i].contains(&names[i]) && !ids[..i].contains(&ids[i]));
+            assert_eq!(serde_json::from_str::<SsimVariant>(&names[i]).unwrap(), SsimVariant::ALL[i]);
+        }
+        let named = |name: &str| serde_json::from_str::<SsimVariant>(&format!("\"{name}\"")).unwrap();
+        assert_eq!(named("torchmetrics-1.4"), SsimVariant::Valid);
+        assert_eq!(named("torchmetrics-1.5"), SsimVariant::Reflect);
     }
 }

@@ -1,8 +1,9 @@
 //! The inner loops: the sum of the SSIM map over a tile of one channel.
 //!
 //! Only four moments are needed, because the index reads the variances as their sum: a, b, a² + b², ab. Each row is
-//! filtered vertically, then horizontally, in chunks of [`LANES`] that the compiler turns into vector instructions of
-//! the machine it runs on; multiplications and additions stay apart, so that all machines agree to the last bit.
+//! filtered vertically, then horizontally, one tap at a time over whole rows, which the compiler turns into vector
+//! instructions of the machine it runs on; multiplications and additions stay apart, so that all machines agree to the
+//! last bit.
 
 use super::Border;
 use super::window::Window;
@@ -35,6 +36,26 @@ pub(super) struct Scratch {
     columns: [Vec<f64>; 4],
     /// One row of each moment after both.
     means: [Vec<f64>; 4],
+    /// One row of the map.
+    index: Vec<f64>,
+}
+
+/// The work of [`Tile::sum`], compiled once per instruction set. (A closure would not be: it is not inlined.)
+struct Sum<'a, 'b> {
+    tile: &'a Tile<'b>,
+    window: &'a Window,
+    constants: &'a Constants,
+    weights: Option<&'a [f64]>,
+    scratch: &'a mut Scratch,
+}
+
+impl pulp::WithSimd for Sum<'_, '_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> f64 {
+        self.tile.sum_rows(self.window, self.constants, self.weights, self.scratch)
+    }
 }
 
 impl Tile<'_> {
@@ -47,10 +68,7 @@ impl Tile<'_> {
         weights: Option<&[f64]>,
         scratch: &mut Scratch,
     ) -> f64 {
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || self.sum_rows(window, constants, weights, scratch),
-        )
+        pulp::Arch::new().dispatch(Sum { tile: self, window, constants, weights, scratch })
     }
 
     #[inline(always)]
@@ -67,13 +85,14 @@ impl Tile<'_> {
         let mut sum = 0.0;
         for y in self.rect.y.clone() {
             scratch.filter_row(window, y - self.rect.y.start, columns, stride);
-            let map = |x: usize| ssim_at(scratch.means.each_ref().map(|m| m[x]), constants);
+            scratch.index_row(constants);
             let n = self.rect.x.len();
+            let index = &scratch.index[..n];
             sum += match weights {
-                None => lane_sum(n, map),
+                None => lane_sum([index], |[index]| index),
                 Some(weights) => {
                     let weights = &weights[y * self.width + self.rect.x.start..][..n];
-                    lane_sum(n, |x| weights[x] * map(x))
+                    lane_sum([index, weights], |[index, weight]| weight * index)
                 }
             };
         }
@@ -146,27 +165,43 @@ impl Scratch {
             }
         }
     }
+
+    /// Turns the row of `means` into a row of the map.
+    #[inline(always)]
+    fn index_row(&mut self, constants: &Constants) {
+        let [a, b, squares, product] = &self.means;
+        self.index.resize(a.len(), 0.0);
+        let means = a.iter().zip(b).zip(squares.iter().zip(product));
+        for (index, ((a, b), (squares, product))) in self.index.iter_mut().zip(means) {
+            *index = ssim_at([*a, *b, *squares, *product], constants);
+        }
+    }
 }
 
-/// `out[x] (+)= taps[0] * from[centre + x] + Σ_k taps[k] * (from[centre + x - k step] + from[centre + x + k step])`;
-/// the length of `out` is a multiple of [`LANES`].
+/// `out[x] (+)= taps[0] * from[centre + x] + Σ_k taps[k] * (from[centre + x - k step] + from[centre + x + k step])`.
 #[inline(always)]
 fn filter(out: &mut [f64], taps: &[f64], from: &[f64], centre: usize, step: usize, add: bool) {
-    for (chunk, out) in out.chunks_exact_mut(LANES).enumerate() {
-        let centre = centre + chunk * LANES;
-        let middle = &from[centre..][..LANES];
-        let mut sums: [f64; LANES] = if add { std::array::from_fn(|i| out[i]) } else { [0.0; LANES] };
-        for i in 0..LANES {
-            sums[i] += taps[0] * middle[i];
+    let n = out.len();
+    let middle = &from[centre..][..n];
+    for (out, middle) in out.iter_mut().zip(middle) {
+        *out = taps[0] * middle + if add { *out } else { 0.0 };
+    }
+    let sides = |k: usize| (&from[centre - k * step..][..n], &from[centre + k * step..][..n]);
+    let mut k = 1;
+    // Two distances per sweep, to load and store `out` half as often.
+    while k + 1 < taps.len() {
+        let ((near_before, near_after), (far_before, far_after)) = (sides(k), sides(k + 1));
+        for i in 0..n {
+            let near = taps[k] * (near_before[i] + near_after[i]);
+            out[i] += near + taps[k + 1] * (far_before[i] + far_after[i]);
         }
-        for (k, &tap) in taps.iter().enumerate().skip(1) {
-            let before = &from[centre - k * step..][..LANES];
-            let after = &from[centre + k * step..][..LANES];
-            for i in 0..LANES {
-                sums[i] += tap * (before[i] + after[i]);
-            }
+        k += 2;
+    }
+    if k < taps.len() {
+        let (before, after) = sides(k);
+        for i in 0..n {
+            out[i] += taps[k] * (before[i] + after[i]);
         }
-        out.copy_from_slice(&sums);
     }
 }
 

@@ -45,11 +45,12 @@ fn bell(k: usize, sigma: f64) -> f64 {
 }
 
 /// The window as 3DGS builds it in f32: taps rounded, their sum and the quotients rounded, and the outer product rounded
-/// once more, so that it is no longer separable: one term per pair of rows at distance k from the centre.
+/// once more, so that it is no longer separable: one term per pair of rows at distance k from the centre. The sum is the
+/// correctly rounded one, as PyTorch's vectorised `sum` gives for this window; adding in order is an ulp off.
 fn rounded_gaussian(radius: usize, sigma: f64) -> Vec<Term> {
     let half: Vec<f32> = (0..=radius).map(|k| bell(k, sigma) as f32).collect();
-    let sum: f32 = (0..=2 * radius).map(|i| half[i.abs_diff(radius)]).sum();
-    let taps: Vec<f32> = half.iter().map(|tap| tap / sum).collect();
+    let sum: f64 = (0..=2 * radius).map(|i| f64::from(half[i.abs_diff(radius)])).sum();
+    let taps: Vec<f32> = half.iter().map(|tap| tap / sum as f32).collect();
     let row = |k: usize| Term {
         vertical: (0..=radius).map(|j| f64::from(u8::from(j == k))).collect(),
         horizontal: taps.iter().map(|tap| f64::from(tap * taps[k])).collect(),
