@@ -16,15 +16,18 @@ pub mod eigen;
 pub mod lanes;
 mod power;
 mod solver;
+mod squaring;
 mod two_bones;
 
-pub use power::{power_iterate, square_to_dominant};
+pub use power::power_iterate;
 pub use solver::{ParseSolverError, Solver, Start};
 pub use two_bones::two_bones;
 
 use super::rotation::{self, SignPolicy, is_distinct};
 use super::{Matrix3, Quaternion, Real, dot4};
 use eigen::SymmetricEigen;
+use squaring::Symmetric;
+use std::marker::PhantomData;
 
 /// A weighted average of rotations.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,75 +73,107 @@ pub fn average_rotation<T: Real>(
 struct Bones<'a, T, S = T> {
     quats: &'a [Quaternion<S>],
     weights: &'a [S],
-    /// The largest weight.
-    heaviest: S,
-    /// Index of the first bone that has it.
-    heaviest_index: usize,
+    /// Index of the first bone that has the largest weight.
+    heaviest: usize,
+    /// Indices of the first and the last bone with a positive weight.
+    first: usize,
+    last: usize,
     /// Number of positive weights.
     count: usize,
-    precision: std::marker::PhantomData<T>,
+    precision: PhantomData<T>,
 }
 
 impl<'a, T: Real> Bones<'a, T> {
     /// Checks the input. See [`average_rotation`].
+    #[inline]
     fn new<S: Real>(quats: &'a [Quaternion<S>], weights: &'a [S]) -> Option<Bones<'a, T, S>> {
-        let (mut heaviest, mut heaviest_index, mut count) = (S::ZERO, 0, 0);
-        for (index, (quat, &weight)) in quats.iter().zip(weights).enumerate() {
-            let zero = quat.iter().all(|&c| c == S::ZERO);
-            let finite = weight.is_finite() && quat.iter().all(|c| c.is_finite());
-            if !finite || weight < S::ZERO || (zero && weight > S::ZERO) {
+        if quats.len() != weights.len() {
+            return None;
+        }
+        let mut bones =
+            Bones { quats, weights, heaviest: 0, first: 0, last: 0, count: 0, precision: PhantomData };
+        for index in 0..quats.len() {
+            let (quat, weight) = (quats[index], weights[index]);
+            if !is_usable(quat, weight) {
                 return None;
             }
-            count += usize::from(weight > S::ZERO);
-            if weight > heaviest {
-                (heaviest, heaviest_index) = (weight, index);
+            if weight > S::ZERO {
+                if bones.count == 0 {
+                    (bones.first, bones.heaviest) = (index, index);
+                }
+                bones.heaviest = if weight > weights[bones.heaviest] { index } else { bones.heaviest };
+                bones.last = index;
+                bones.count += 1;
             }
         }
-        let precision = std::marker::PhantomData;
-        let bones = Bones { quats, weights, heaviest, heaviest_index, count, precision };
-        (quats.len() == weights.len() && count > 0).then_some(bones)
+        (bones.count > 0).then_some(bones)
     }
 }
 
-impl<T: Real, S: Real> Bones<'_, T, S> {
-    /// Bones that count: (unit quaternion, weight relative to the heaviest).
-    fn iter(&self) -> impl Iterator<Item = (Quaternion<T>, T)> {
-        let heaviest = self.heaviest.to_f64();
-        self.quats.iter().zip(self.weights).filter(|(_, weight)| **weight > S::ZERO).map(move |(q, w)| {
-            let q = q.map(|c| T::from_f64(c.to_f64()));
-            let unit = rotation::normalize(q).expect("checked to be finite and not zero");
-            (unit, T::from_f64(w.to_f64() / heaviest))
-        })
-    }
+/// Weight finite and not negative, quaternion finite, and not zero if it counts.
+#[inline]
+fn is_usable<T: Real>(quat: Quaternion<T>, weight: T) -> bool {
+    let squared = dot4(quat, quat);
+    let weight_is_usable = weight >= T::ZERO && weight.is_finite();
+    // The square decides unless it overflowed or underflowed.
+    let is_plain = squared > T::MIN_POSITIVE && squared.is_finite();
+    weight_is_usable
+        && (is_plain
+            || quat.iter().all(|c| c.is_finite())
+                && (weight == T::ZERO || quat.iter().any(|&c| c != T::ZERO)))
+}
 
-    /// The heaviest bone, of unit length.
-    fn heaviest(&self) -> Quaternion<T> {
-        let q = self.quats[self.heaviest_index].map(|c| T::from_f64(c.to_f64()));
+impl<T: Real, S: Real> Bones<'_, T, S> {
+    /// A bone that counts, of unit length.
+    #[inline]
+    fn unit(&self, index: usize) -> Quaternion<T> {
+        let [w, x, y, z] = self.quats[index];
+        let q = [
+            T::from_f64(w.to_f64()),
+            T::from_f64(x.to_f64()),
+            T::from_f64(y.to_f64()),
+            T::from_f64(z.to_f64()),
+        ];
         rotation::normalize(q).expect("checked to be finite and not zero")
     }
 
-    /// The first two bones that count, with weights.
+    /// The weight of a bone relative to the heaviest, which keeps sums in range.
+    #[inline]
+    fn relative_weight(&self, index: usize) -> T {
+        T::from_f64(self.weights[index].to_f64() / self.weights[self.heaviest].to_f64())
+    }
+
+    /// Bones that count: (unit quaternion, weight relative to the heaviest).
+    #[inline]
+    fn iter(&self) -> impl Iterator<Item = (Quaternion<T>, T)> {
+        (self.first..=self.last)
+            .filter(|&index| self.weights[index] > S::ZERO)
+            .map(|index| (self.unit(index), self.relative_weight(index)))
+    }
+
+    /// The heaviest bone, of unit length.
+    #[inline]
+    fn heaviest(&self) -> Quaternion<T> {
+        self.unit(self.heaviest)
+    }
+
+    /// Both bones with their weights, if two count.
+    #[inline]
     fn pair(&self) -> Option<[(Quaternion<T>, T); 2]> {
-        let mut bones = self.iter();
-        (self.count == 2).then(|| bones.next().zip(bones.next()).map(|(a, b)| [a, b])).flatten()
+        (self.count == 2).then(|| [self.first, self.last].map(|i| (self.unit(i), self.relative_weight(i))))
     }
 
     /// A = Σ w q qᵀ with weights relative to the heaviest.
-    fn outer_sum(&self) -> [[T; 4]; 4] {
-        let mut a = [[T::ZERO; 4]; 4];
-        for (q, weight) in self.iter() {
-            for i in 0..4 {
-                for j in i..4 {
-                    a[i][j] += (weight * q[i]) * q[j];
-                }
+    fn outer_sum(&self) -> Symmetric<T> {
+        let mut sum = [T::ZERO; 10];
+        for ([w, x, y, z], weight) in self.iter() {
+            let [sw, sx, sy, sz] = [weight * w, weight * x, weight * y, weight * z];
+            let terms = [sw * w, sw * x, sw * y, sw * z, sx * x, sx * y, sx * z, sy * y, sy * z, sz * z];
+            for (entry, term) in sum.iter_mut().zip(terms) {
+                *entry += term;
             }
         }
-        for i in 0..4 {
-            for j in 0..i {
-                a[i][j] = a[j][i];
-            }
-        }
-        a
+        sum
     }
 
     /// B = Σ w R(q) with weights relative to the heaviest.
@@ -175,10 +210,11 @@ impl<T: Real, S: Real> Bones<'_, T, S> {
     }
 
     /// The leading eigenvector by Jacobi, or the choice for ties.
-    fn eigen(&self, a: [[T; 4]; 4]) -> Quaternion<T> {
-        let eigen = SymmetricEigen::new(a);
+    fn eigen(&self, a: &Symmetric<T>) -> Quaternion<T> {
+        let eigen = SymmetricEigen::new(squaring::rows(a));
         if is_distinct(eigen.values[0] - eigen.values[1], eigen.values[0]) {
-            eigen.vectors[0]
+            // The product of some thirty plane rotations has drifted from unit length by a few ulp.
+            rotation::normalize(eigen.vectors[0]).unwrap_or(eigen.vectors[0])
         } else {
             self.tie_break(&eigen)
         }
@@ -193,7 +229,7 @@ impl<T: Real, S: Real> Bones<'_, T, S> {
             return two_bones(p, u, q, v).unwrap_or_else(|| self.heaviest());
         }
         let a = self.outer_sum();
-        power::dominant_eigenvector(a).unwrap_or_else(|| self.eigen(a))
+        squaring::dominant_eigenvector(&a).unwrap_or_else(|| self.eigen(&a))
     }
 
     /// Every solver but the closed form, in the precision `T`.
@@ -203,27 +239,27 @@ impl<T: Real, S: Real> Bones<'_, T, S> {
         }
         match solver {
             Solver::ClosedForm => self.closed_form(),
-            Solver::Eigen => self.eigen(self.outer_sum()),
+            Solver::Eigen => self.eigen(&self.outer_sum()),
             Solver::Polar => rotation::proper_polar_factor(self.blend())
-                .map_or_else(|| self.eigen(self.outer_sum()), rotation::matrix_to_quaternion),
+                .map_or_else(|| self.eigen(&self.outer_sum()), rotation::matrix_to_quaternion),
             Solver::Power { steps, start } => {
                 let a = self.outer_sum();
-                power_iterate(a, self.start(start, &a), steps)
+                power_iterate(squaring::rows(&a), self.start(start, &a), steps)
             }
-            Solver::Squaring { doublings } => square_to_dominant(self.outer_sum(), doublings),
+            Solver::Squaring { doublings } => squaring::square_times(&self.outer_sum(), doublings),
             Solver::Nlerp => self.nlerp(),
         }
     }
 
     /// The start vector of a power iteration.
-    fn start(&self, start: Start, a: &[[T; 4]; 4]) -> Quaternion<T> {
+    fn start(&self, start: Start, a: &Symmetric<T>) -> Quaternion<T> {
         match start {
             Start::Heaviest => self.heaviest(),
             Start::First => self.iter().next().map_or_else(rotation::identity, |(q, _)| q),
             Start::Ones => [T::from_f64(0.5); 4],
             Start::Identity => rotation::identity(),
             Start::Nlerp => self.nlerp(),
-            Start::LargestColumn => power::largest_column(a),
+            Start::LargestColumn => squaring::largest_column(a),
         }
     }
 
@@ -235,7 +271,7 @@ impl<T: Real, S: Real> Bones<'_, T, S> {
         if let Some([(p, u), (q, v)]) = self.pair() {
             return two_bones::relative_gap(p, u, q, v);
         }
-        let [first, second, ..] = SymmetricEigen::new(self.outer_sum()).values;
+        let [first, second, ..] = SymmetricEigen::new(squaring::rows(&self.outer_sum())).values;
         ((first - second) / first).max(T::ZERO).min(T::ONE)
     }
 }
