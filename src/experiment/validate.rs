@@ -94,7 +94,12 @@ fn variant_is_possible(variant: &Variant, key: &str, file: &str) -> Result<(), E
         (Some(_), false) => {
             return fail("strategy", "given".into(), "none: a textured mesh has no Gaussians");
         }
-        _ => {}
+        (Some(spec), true) => {
+            if let Err((problem, expected)) = catalog::strategy(spec) {
+                return fail("strategy", problem, &expected);
+            }
+        }
+        (None, false) => {}
     }
     let made_gaussians = variant.avatar.is_gaussian() && variant.avatar.is_built();
     match variant.sh_degree {

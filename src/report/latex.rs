@@ -55,7 +55,7 @@ fn group_headings(table: &Table) -> String {
 }
 
 fn cell(cell: &Cell) -> String {
-    let text = escape(&cell.text);
+    let text = escape(&cell.text.replace('-', "−"));
     let text = if cell.best { format!("\\textbf{{{text}}}") } else { text };
     match cell.footnotes() {
         None => text,

@@ -53,15 +53,15 @@ fn grid(table: &Table) -> String {
             }
             above = Some(group);
         }
-        let cells = row.cells.iter().map(|cell| self::cell(cell, row.kind));
+        let cells = row.cells.iter().map(cell);
         text += &line(&labels.into_iter().chain(cells).collect::<Vec<_>>());
     }
     text
 }
 
-fn cell(cell: &Cell, kind: RowKind) -> String {
-    let minus = if kind == RowKind::Difference { cell.text.replace('-', "−") } else { cell.text.clone() };
-    let text = if cell.best { format!("**{minus}**") } else { minus };
+fn cell(cell: &Cell) -> String {
+    let number = cell.text.replace('-', "−");
+    let text = if cell.best { format!("**{number}**") } else { number };
     match cell.footnotes() {
         None => text,
         Some(numbers) => format!("{text} <sup>{numbers}</sup>"),
@@ -100,7 +100,8 @@ fn comparisons(comparisons: &[Comparison]) -> String {
 /// `+0.12 [+0.05, +0.20], won 83 %`.
 fn difference(difference: &MetricDifference) -> String {
     let Some(paired) = difference.paired else { return "—".to_owned() };
-    let signed = |value: f64| Cell::difference(value, difference.decimals).text.replace('-', "−");
+    // One digit more than the table: differences are smaller than what they are differences of.
+    let signed = |value: f64| Cell::difference(value, difference.decimals + 1).text.replace('-', "−");
     let interval = match paired.interval {
         Some([low, high]) => format!(" [{}, {}]", signed(low), signed(high)),
         None => String::new(),
@@ -135,6 +136,6 @@ mod tests {
     #[test]
     fn footnotes_and_bold_go_together() {
         let cell = Cell { best: true, notes: vec![0, 2], ..Cell::new(Content::Number(1.0), 1) };
-        assert_eq!(super::cell(&cell, RowKind::Measured), "**1.0** <sup>1,3</sup>");
+        assert_eq!(super::cell(&cell), "**1.0** <sup>1,3</sup>");
     }
 }

@@ -168,7 +168,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_interval_lies_among_the_values(values in proptest::collection::vec(-5.0..5.0_f64, 5..40)) {
-            let paired = paired(&[values.clone()], true).expect("finite");
+            let paired = paired(std::slice::from_ref(&values), true).expect("finite");
             let [low, high] = paired.interval.expect("enough frames");
             let min = values.iter().copied().fold(f64::INFINITY, f64::min);
             let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);

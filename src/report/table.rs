@@ -35,6 +35,13 @@ pub struct Table {
     pub paper: Option<Box<Table>>,
 }
 
+impl Table {
+    /// The value as JSON, indented, with a final newline.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("keys are strings and every number is finite") + "\n"
+    }
+}
+
 /// Two variants compared frame by frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

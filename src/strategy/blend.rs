@@ -53,7 +53,7 @@ impl Blend {
     pub(super) fn transform(&self, x: &[Lanes; 3]) -> [Lanes; 3] {
         let mut moved = [[0.0; LANES]; 3];
         for row in 0..3 {
-            let [a, b, c] = [0, 1, 2].map(|column: usize| &self.linear[3 * row + column]);
+            let (a, b, c) = (&self.linear[3 * row], &self.linear[3 * row + 1], &self.linear[3 * row + 2]);
             for lane in 0..LANES {
                 let linear = a[lane] * x[0][lane] + b[lane] * x[1][lane] + c[lane] * x[2][lane];
                 moved[row][lane] = linear + self.translation[row][lane];

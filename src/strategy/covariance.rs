@@ -37,6 +37,7 @@ impl Canonical {
     /// iHuman's parameters: `R_c = [n | c r1 + s r2 | c r2 − s r1]` on the rest face and `S = (1 mm, e^s0, e^s1)`. The
     /// axis of R_c nearest to the normal becomes n, the in-plane angle (c, s) is the one nearest to the other two.
     /// Gaussians on a face without area are left as they are.
+    #[inline(never)]
     fn flatten(&mut self, block: &Block, start: usize, surface: &Surface) {
         for lane in 0..LANES {
             let seat = &surface.seats[start + usize::from(block.index[lane])];
@@ -79,23 +80,44 @@ pub(super) fn factors(
     scales: &[Lanes; 3],
 ) -> [Lanes; 9] {
     let mut factors = [[0.0; LANES]; 9];
-    for lane in 0..LANES {
-        let own = |sign: f32| {
-            let [w, x, y, z] = take(canonical, lane);
-            rotation::quaternion_to_matrix_raw([w, sign * x, sign * y, sign * z])
-        };
-        let matrix = match choice {
-            CovarianceChoice::Rotate | CovarianceChoice::Surfel => {
-                rotation::quaternion_to_matrix_raw(take(posed, lane))
+    match choice {
+        CovarianceChoice::Rotate | CovarianceChoice::Surfel => {
+            for lane in 0..LANES {
+                let rotation = rotation::quaternion_to_matrix_raw(take(posed, lane));
+                put(&mut factors, lane, &rotation, scales);
             }
-            CovarianceChoice::Affine => matrix3::multiply(blend.matrix(lane), own(1.0)),
-            CovarianceChoice::AffineConjugate => matrix3::multiply(blend.matrix(lane), own(-1.0)),
-        };
-        for row in 0..3 {
-            for column in 0..3 {
-                factors[3 * row + column][lane] = matrix[row][column] * scales[column][lane];
+        }
+        CovarianceChoice::Affine | CovarianceChoice::AffineConjugate => {
+            let sign = if choice == CovarianceChoice::Affine { 1.0 } else { -1.0 };
+            for lane in 0..LANES {
+                let [w, x, y, z] = take(canonical, lane);
+                let own = rotation::quaternion_to_matrix_raw([w, sign * x, sign * y, sign * z]);
+                put(&mut factors, lane, &product(&blend.matrix(lane), &own), scales);
             }
         }
     }
     factors
+}
+
+/// Sets one lane to `matrix diag(scales)`.
+#[inline(always)]
+fn put(factors: &mut [Lanes; 9], lane: usize, matrix: &Matrix3<f32>, scales: &[Lanes; 3]) {
+    for row in 0..3 {
+        for column in 0..3 {
+            factors[3 * row + column][lane] = matrix[row][column] * scales[column][lane];
+        }
+    }
+}
+
+/// a b, without the array adaptors that keep a loop from being vectorised.
+#[inline(always)]
+fn product(a: &Matrix3<f32>, b: &Matrix3<f32>) -> Matrix3<f32> {
+    let mut product = [[0.0; 3]; 3];
+    for row in 0..3 {
+        for column in 0..3 {
+            product[row][column] =
+                a[row][0] * b[0][column] + a[row][1] * b[1][column] + a[row][2] * b[2][column];
+        }
+    }
+    product
 }

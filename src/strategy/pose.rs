@@ -1,11 +1,11 @@
 //! Canonical avatar and posed body to [`Posed`], a chunk of Gaussians at a time.
 
 use super::blend::Blend;
-use super::bound::{BodyShape, Moves};
+use super::bound::{BodyShape, Moves, Surface};
 use super::covariance::{Canonical, factors};
 use super::joints::Joints;
 use super::layout::{Block, CHUNK, Chunk, LANES, Lanes};
-use super::rotate::{BlockInput, Source, Turn, dual_means, turn};
+use super::rotate::{BlockInput, Source, Turn, dual_means, take, turn};
 use super::{
     BoundAvatar, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
     StrategyError, colour, face_frame,
@@ -69,9 +69,10 @@ pub fn pose<'a>(
         view_frames: view_frames.as_deref_mut().unwrap_or_default(),
         sh: sh.as_deref_mut().unwrap_or_default(),
     };
+    let arch = pulp::Arch::new();
     let parts = outputs.split(bound.sh_count());
     bound.chunks.par_iter().zip(parts).enumerate().for_each(|(c, (chunk, outputs))| {
-        pulp::Arch::new().dispatch(PoseChunk { frame: &frame, chunk, start: c * CHUNK, outputs });
+        arch.dispatch(PoseChunk { arch, frame: &frame, chunk, start: c * CHUNK, outputs });
     });
 
     Ok(Posed {
@@ -125,6 +126,7 @@ impl<'o> Outputs<'o> {
 
 /// The work on one chunk, compiled for each instruction set.
 struct PoseChunk<'a, 'o> {
+    arch: pulp::Arch,
     frame: &'a Frame<'a>,
     chunk: &'a Chunk,
     start: usize,
@@ -157,7 +159,7 @@ impl PoseChunk<'_, '_> {
             blend: &blend,
             canonical: &canonical.rotations,
         };
-        let turn = turn(source, &input);
+        let turn = turn(self.arch, source, &input);
         let (means, scales) = self.place(&input, canonical.scales);
         let factors = factors(strategy.covariance, &turn.posed, &blend, &canonical.rotations, &scales);
         self.store(block, &means, &factors, &turn, &blend);
@@ -166,7 +168,7 @@ impl PoseChunk<'_, '_> {
     /// Posed means, and the scales, which HAHA multiplies.
     #[inline(always)]
     fn place(&self, input: &BlockInput<'_>, mut scales: [Lanes; 3]) -> ([Lanes; 3], [Lanes; 3]) {
-        let Frame { bound, body, strategy, source, .. } = self.frame;
+        let Frame { bound, strategy, source, .. } = self.frame;
         let mut means = match (bound.moves, source) {
             (Moves::Not, _) => input.block.means,
             (Moves::ByWeights, Source::Dual) => dual_means(input),
@@ -178,6 +180,21 @@ impl PoseChunk<'_, '_> {
             Some(surface) if bound.moves == Moves::WithFaces || scaled => surface,
             _ => return (means, scales),
         };
+        self.place_on_mesh(input, surface, &mut means, &mut scales);
+        (means, scales)
+    }
+
+    /// Means that follow the mesh.
+    #[inline(never)]
+    fn place_on_mesh(
+        &self,
+        input: &BlockInput<'_>,
+        surface: &Surface,
+        means: &mut [Lanes; 3],
+        scales: &mut [Lanes; 3],
+    ) {
+        let Frame { bound, body, strategy, source, .. } = self.frame;
+        let scaled = strategy.rotation == RotationChoice::FaceFrame(FaceFrame::HahaScaled);
         let mesh = body.mesh();
         for lane in 0..LANES {
             let gaussian = self.start + usize::from(input.block.index[lane]);
@@ -202,7 +219,6 @@ impl PoseChunk<'_, '_> {
                 means[axis][lane] = mean[axis];
             }
         }
-        (means, scales)
     }
 
     #[inline(always)]
@@ -212,10 +228,10 @@ impl PoseChunk<'_, '_> {
         for lane in 0..block.count {
             let i = usize::from(block.index[lane]);
             self.outputs.means[i] = Vec3::new(means[0][lane], means[1][lane], means[2][lane]);
-            let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = factors.map(|entry| entry[lane]);
-            self.outputs.factors[i] = Mat3::from_cols_array(&[xx, yx, zx, xy, yy, zy, xz, yz, zz]);
+            let column = |c: usize| Vec3::new(factors[c][lane], factors[3 + c][lane], factors[6 + c][lane]);
+            self.outputs.factors[i] = Mat3::from_cols(column(0), column(1), column(2));
             if let Some(rotation) = self.outputs.rotations.get_mut(i) {
-                *rotation = turn.posed.map(|component| component[lane]);
+                *rotation = take(&turn.posed, lane);
             }
             if let Some(frame) = self.outputs.view_frames.get_mut(i)
                 && let Some(view) = colour::view_frame(strategy.colour, &turn.relative, blend, lane)

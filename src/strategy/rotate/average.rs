@@ -16,6 +16,7 @@ const PAIR_GAP: f32 = 1e-4;
 /// The average of each lane as a unit quaternion of either sign.
 #[inline(always)]
 pub(super) fn average(
+    arch: pulp::Arch,
     joints: &Joints,
     indices: &[u16],
     weights: &[Lanes],
@@ -31,23 +32,50 @@ pub(super) fn average(
             average
         }
         (_, Solver::ClosedForm) => {
-            let lanes::Lanes { mut quats, settled } = match &joints.rotation_matrix {
-                None => lanes::from_blends(&blend.linear, &blend.weight),
+            let blended;
+            let rotations = match &joints.rotation_matrix {
+                None => &blend.linear,
                 Some(matrices) => {
-                    lanes::from_blends(&blend::rotations(matrices, indices, weights), &blend.weight)
+                    blended = blend::rotations(matrices, indices, weights);
+                    &blended
                 }
             };
+            let lanes::Lanes { mut quats, settled } = dominant(arch, rotations, &blend.weight);
             settle(joints, indices, weights, &settled, &mut quats);
             quats
         }
-        _ => {
-            let mut average = splat(rotation::identity());
-            for lane in 0..LANES {
-                put(&mut average, lane, of_lane(joints, indices, weights, lane, solver));
-            }
-            average
-        }
+        _ => one_by_one(joints, indices, weights, solver),
     }
+}
+
+/// Three joints or more. A function of its own, small enough for the compiler to inline all that is in it.
+#[inline(never)]
+fn dominant(arch: pulp::Arch, rotations: &[Lanes; 9], weight: &Lanes) -> lanes::Lanes<LANES> {
+    arch.dispatch(Dominant { rotations, weight })
+}
+
+struct Dominant<'a> {
+    rotations: &'a [Lanes; 9],
+    weight: &'a Lanes,
+}
+
+impl pulp::NullaryFnOnce for Dominant<'_> {
+    type Output = lanes::Lanes<LANES>;
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        lanes::from_blends(self.rotations, self.weight)
+    }
+}
+
+/// Any solver.
+#[inline(never)]
+fn one_by_one(joints: &Joints, indices: &[u16], weights: &[Lanes], solver: Solver) -> [Lanes; 4] {
+    let mut average = splat(rotation::identity());
+    for lane in 0..LANES {
+        put(&mut average, lane, of_lane(joints, indices, weights, lane, solver));
+    }
+    average
 }
 
 /// Two joints p, q with weights u, v, as [`crate::math::average::two_bones`]: `(ρ + c)(p + q) + κ (1 + c)(p − q)` with
@@ -59,14 +87,16 @@ fn pair(joints: &Joints, [a, b]: [u16; 2], [u, v]: [&Lanes; 2]) -> ([Lanes; 4], 
     let c = cosine.abs().min(1.0);
     let sine2 = ((1.0 - c) * (1.0 + c)) as f32;
     let (c, sign) = (c as f32, 1.0f32.copysign(cosine as f32));
-    let (p, q) = (joints.rotation[a], joints.rotation[b].map(|x| x * sign));
+    let (p, [w, x, y, z]) = (joints.rotation[a], joints.rotation[b]);
+    let q = [w * sign, x * sign, y * sign, z * sign];
     let (mut average, mut settled) = ([[0.0; LANES]; 4], [false; LANES]);
     for lane in 0..LANES {
         let kappa = (u[lane] - v[lane]) / (u[lane] + v[lane]);
         let gap = (c * c + kappa * kappa * sine2).sqrt();
         let (even, odd) = (gap + c, kappa * (1.0 + c));
         let (of_p, of_q) = (even + odd, even - odd);
-        let [w, x, y, z] = [0, 1, 2, 3].map(|k: usize| of_p * p[k] + of_q * q[k]);
+        let (w, x) = (of_p * p[0] + of_q * q[0], of_p * p[1] + of_q * q[1]);
+        let (y, z) = (of_p * p[2] + of_q * q[2], of_p * p[3] + of_q * q[3]);
         let inverse = 1.0 / ((w * w + x * x) + (y * y + z * z)).sqrt();
         settled[lane] = gap > PAIR_GAP;
         average[0][lane] = w * inverse;
@@ -134,7 +164,7 @@ pub(super) fn with_bones<R>(
 /// The same quaternion in every lane.
 #[inline(always)]
 pub(super) fn splat(q: Quaternion<f32>) -> [Lanes; 4] {
-    q.map(|c| [c; LANES])
+    [[q[0]; LANES], [q[1]; LANES], [q[2]; LANES], [q[3]; LANES]]
 }
 
 /// Sets one lane.

@@ -30,6 +30,7 @@ impl Motions {
 }
 
 /// Blends the motions of a block's joints. See [`dual_quaternion::blend`].
+#[inline(never)]
 pub(super) fn blend(joints: &Joints, indices: &[u16], weights: &[Lanes]) -> Motions {
     const STACK: usize = 16;
     let identity = DualQuaternion::new(rotation::identity(), [0.0; 3]);

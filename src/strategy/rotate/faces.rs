@@ -34,7 +34,7 @@ impl FaceTurns {
     }
 
     /// The turns of a block.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn of_block(&self, input: &BlockInput<'_>) -> [Lanes; 4] {
         let mut turns = splat(rotation::identity());
         for lane in 0..LANES {
@@ -127,7 +127,7 @@ impl VertexTurns {
     }
 
     /// The turns of a block.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn of_block(&self, input: &BlockInput<'_>) -> [Lanes; 4] {
         let mut turns = splat(rotation::identity());
         for lane in 0..LANES {

@@ -9,7 +9,7 @@ use crate::math::{Quaternion, matrix3, rotation};
 /// The projections that need B alone. A rigid joint alone is its own projection.
 ///
 /// Where Gram-Schmidt is ill-posed (two columns or rows parallel, or one zero) the nearest rotation takes its place.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn projected(projection: LbsProjection, input: &BlockInput<'_>) -> [Lanes; 4] {
     let (indices, _) = input.chunk.influences(input.block);
     if let (&[joint], true) = (indices, input.joints.rigid()) {
@@ -35,6 +35,7 @@ pub(super) fn projected(projection: LbsProjection, input: &BlockInput<'_>) -> [L
 }
 
 /// PyTorch3D's quaternion of B R_c, raw or normalised: the posed quaternion itself.
+#[inline(never)]
 pub(super) fn converted(projection: LbsProjection, input: &BlockInput<'_>) -> Turn {
     let mut turn = Turn { relative: splat(rotation::identity()), posed: splat(rotation::identity()) };
     for lane in 0..LANES {

@@ -87,7 +87,7 @@ impl BlockInput<'_> {
 
 /// Turns a block.
 #[inline(always)]
-pub(super) fn turn(source: &Source, input: &BlockInput<'_>) -> Turn {
+pub(super) fn turn(arch: pulp::Arch, source: &Source, input: &BlockInput<'_>) -> Turn {
     let (indices, weights) = input.chunk.influences(input.block);
     if indices.is_empty() {
         return Turn { relative: splat(rotation::identity()), posed: *input.canonical };
@@ -99,7 +99,9 @@ pub(super) fn turn(source: &Source, input: &BlockInput<'_>) -> Turn {
             return lbs::converted(*projection, input);
         }
         Source::Lbs(projection) => lbs::projected(*projection, input),
-        Source::Average(solver) => average::average(input.joints, indices, weights, input.blend, *solver),
+        Source::Average(solver) => {
+            average::average(arch, input.joints, indices, weights, input.blend, *solver)
+        }
         Source::Dual => dual::blend(input.joints, indices, weights).real,
         Source::Faces(turns) => turns.of_block(input),
         Source::Vertices(turns) => turns.of_block(input),
