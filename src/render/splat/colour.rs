@@ -1,5 +1,7 @@
 //! View-dependent colour: real spherical harmonics to degree 3 in the 3DGS basis and order.
 
+use super::lanes::Lanes;
+use super::wide::Wide;
 use crate::scene::ColourClamp;
 
 const C0: f32 = 0.282_094_791_773_878_14;
@@ -21,51 +23,71 @@ const C3: [f32; 7] = [
     -0.590_043_589_926_643_5,
 ];
 
-/// The sixteen basis functions along a unit direction.
+/// The sixteen basis functions along unit directions.
 #[inline(always)]
-pub(super) fn basis([x, y, z]: [f32; 3]) -> [f32; 16] {
+pub(super) fn basis<L: Lanes>([x, y, z]: [Wide<L>; 3]) -> [Wide<L>; 16] {
+    let n = |value: f32| x.constant(value);
     let (xx, yy, zz, xy, yz, xz) = (x * x, y * y, z * z, x * y, y * z, x * z);
+    let (difference, sum) = (xx - yy, xx + yy);
+    let four_zz = n(4.0).mul_add(zz, -sum);
     [
-        C0,
-        -C1 * y,
-        C1 * z,
-        -C1 * x,
-        C2[0] * xy,
-        C2[1] * yz,
-        C2[2] * (2.0 * zz - xx - yy),
-        C2[3] * xz,
-        C2[4] * (xx - yy),
-        C3[0] * y * (3.0 * xx - yy),
-        C3[1] * xy * z,
-        C3[2] * y * (4.0 * zz - xx - yy),
-        C3[3] * z * (2.0 * zz - 3.0 * xx - 3.0 * yy),
-        C3[4] * x * (4.0 * zz - xx - yy),
-        C3[5] * z * (xx - yy),
-        C3[6] * x * (xx - 3.0 * yy),
+        n(C0),
+        n(-C1) * y,
+        n(C1) * z,
+        n(-C1) * x,
+        n(C2[0]) * xy,
+        n(C2[1]) * yz,
+        n(C2[2]) * n(2.0).mul_add(zz, -sum),
+        n(C2[3]) * xz,
+        n(C2[4]) * difference,
+        n(C3[0]) * y * n(3.0).mul_add(xx, -yy),
+        n(C3[1]) * xy * z,
+        n(C3[2]) * y * four_zz,
+        n(C3[3]) * z * n(2.0).mul_add(zz, n(-3.0) * sum),
+        n(C3[4]) * x * four_zz,
+        n(C3[5]) * z * difference,
+        n(C3[6]) * x * n(-3.0).mul_add(yy, xx),
     ]
 }
 
-/// The direction in which the SH of a Gaussian are read: `normalize(F (mean - camera))`, 0 where that vanishes.
+/// The direction in which the SH of a Gaussian are read: `normalize(F (mean - camera))`, 0 where that vanishes. F by
+/// columns.
 #[inline(always)]
-pub(super) fn direction(mean: [f32; 3], camera: [f32; 3], frame: [[f32; 3]; 3]) -> [f32; 3] {
-    let d: [f32; 3] = std::array::from_fn(|i| mean[i] - camera[i]);
-    let turned: [f32; 3] =
-        std::array::from_fn(|i| frame[2][i].mul_add(d[2], frame[1][i].mul_add(d[1], frame[0][i] * d[0])));
+pub(super) fn direction<L: Lanes>(
+    mean: [Wide<L>; 3],
+    camera: [f32; 3],
+    frame: Option<[[Wide<L>; 3]; 3]>,
+) -> [Wide<L>; 3] {
+    let n = |value: f32| mean[0].constant(value);
+    let d = [0, 1, 2].map(|i| mean[i] - n(camera[i]));
+    let turned = match frame {
+        Some(f) => [0, 1, 2].map(|i| f[2][i].mul_add(d[2], f[1][i].mul_add(d[1], f[0][i] * d[0]))),
+        None => d,
+    };
     let square = turned[2].mul_add(turned[2], turned[1].mul_add(turned[1], turned[0] * turned[0]));
-    let scale = if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 };
+    let scale = n(0.0).less(square).keep(n(1.0) / square.sqrt());
     turned.map(|v| v * scale)
 }
 
-/// `Σ b_k c_k + 1/2`, before clamping. `coefficients` are RGB triples, as many as the degree has.
+/// `Σ b_k c_k + 1/2`, before clamping. `coefficients` are RGB triples, as many as the degree has; `basis(k)` is b_k.
 #[inline(always)]
-pub(super) fn evaluate(coefficients: &[[f32; 3]], basis: &[f32; 16]) -> [f32; 3] {
-    let mut colour = [0.5; 3];
-    for (c, &b) in coefficients.iter().zip(basis) {
-        for (sum, &c) in colour.iter_mut().zip(c) {
+pub(super) fn evaluate(coefficients: &[[f32; 3]], basis: impl Fn(usize) -> f32) -> [f32; 3] {
+    let flat = coefficients.as_flattened();
+    // Four floats at a time, of which the last is the next triple's: one vector load.
+    let mut sum = [0.5; 4];
+    let mut add = |k: usize, c: [f32; 4]| {
+        let b = basis(k);
+        for (sum, c) in sum.iter_mut().zip(c) {
             *sum = b.mul_add(c, *sum);
         }
+    };
+    for (k, window) in flat.windows(4).step_by(3).enumerate() {
+        add(k, [window[0], window[1], window[2], window[3]]);
     }
-    colour
+    if let [.., [r, g, b]] = *coefficients {
+        add(coefficients.len() - 1, [r, g, b, 0.0]);
+    }
+    [sum[0], sum[1], sum[2]]
 }
 
 /// The clamp that follows; NaN becomes 0.

@@ -6,8 +6,10 @@
 
 use super::blend::alpha_at;
 use super::colour;
+use super::lanes::Arrays;
 use super::preprocess::Paint;
 use super::project::{Projected, View, project};
+use super::wide::Wide;
 use crate::scene::{Camera, ColourClamp};
 use glam::{DMat3, DMat4, DQuat, DVec3, Mat3};
 use serde_json::Value;
@@ -52,11 +54,17 @@ fn factor_of(case: &Value) -> DMat3 {
     DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize()) * DMat3::from_diagonal(scale)
 }
 
-fn project_case(case: &Value, antialiased: bool) -> Projected {
+fn wide(value: f32) -> Wide<Arrays> {
+    Wide::splat(Arrays, value)
+}
+
+fn project_case(case: &Value, antialiased: bool) -> Projected<f32> {
     let view = View::new(&camera_of(case), antialiased);
     let mean = numbers::<3>(&case["mean"]).map(|v| v as f32);
     let factor: Mat3 = factor_of(case).as_mat3();
-    project(&view, mean, factor.to_cols_array_2d(), number(&case["opacity"]) as f32)
+    let factor = factor.to_cols_array_2d().map(|column| column.map(wide));
+    let projected = project(&view, mean.map(wide), factor, wide(number(&case["opacity"]) as f32));
+    projected.map(|row| row.store()[0])
 }
 
 #[test]
@@ -116,14 +124,17 @@ fn colours_have_the_reference_values_at_every_degree() {
         for (found, expected) in camera.into_iter().zip(numbers::<3>(&case["cam_pos"])) {
             close("camera position", i, found, expected, 1.0, 1e-6);
         }
-        let direction = colour::direction(mean, camera, Mat3::IDENTITY.to_cols_array_2d());
-        for (found, expected) in direction.into_iter().zip(numbers::<3>(&case["view_dir"])) {
+        let direction = colour::direction(mean.map(wide), camera, None);
+        let basis = colour::basis(direction).map(|row| row.store()[0]);
+        for (found, expected) in
+            direction.map(|row| row.store()[0]).into_iter().zip(numbers::<3>(&case["view_dir"]))
+        {
             close("direction", i, found, expected, 1.0, 1e-6);
         }
         for degree in 0..=3 {
             let expected = &case["sh_rgb"][degree.to_string()];
             let count = (degree + 1) * (degree + 1);
-            let unclamped = colour::evaluate(&sh[..count], &colour::basis(direction));
+            let unclamped = colour::evaluate(&sh[..count], |k| basis[k]);
             let rgb = colour::clamped(unclamped, ColourClamp::NonNegative);
             for c in 0..3 {
                 close("unclamped", i, unclamped[c], number(&expected["unclamped"][c]), 1.0, 1e-5);

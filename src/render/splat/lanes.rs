@@ -16,6 +16,7 @@ pub(super) trait Lanes: Copy {
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
     /// `a b + c`, rounded once.
     fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// `c - a b`, rounded once.
@@ -31,17 +32,26 @@ pub(super) trait Lanes: Copy {
     fn round(self, a: Self::F) -> Self::F;
     /// `p / 2^n` for p in \[0.5, 2\] and integral n in 0..=120; any value for other n, but no trap.
     fn divide_by_power_of_two(self, p: Self::F, n: Self::F) -> Self::F;
+    /// `(e, m)` with `a = m 2^e`, m in \[√½, √2): for positive normal numbers; anything for others.
+    fn split_exponent(self, a: Self::F) -> (Self::F, Self::F);
     /// Towards zero, for values that an `i32` holds.
     fn to_integers(self, a: Self::F) -> [i32; 16];
     /// `0 <= a <= limit` for positive limits (−0 counts as negative).
     fn in_range(self, a: Self::F, limit: Self::F) -> Self::M;
     fn less(self, a: Self::F, b: Self::F) -> Self::M;
+    fn both(self, a: Self::M, b: Self::M) -> Self::M;
     fn any(self, mask: Self::M) -> bool;
     /// `a` where the mask is set, else 0.
     fn keep(self, mask: Self::M, a: Self::F) -> Self::F;
     /// `a` where the mask is set, else `b`.
     fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F;
 }
+
+/// Bits of the mantissa of an `f32`.
+pub(super) const MANTISSA_BITS: u32 = 23;
+pub(super) const MANTISSA: u32 = (1 << MANTISSA_BITS) - 1;
+/// Bits of √½.
+pub(super) const ROOT_HALF: u32 = 0x3f35_04f3;
 
 /// A computation that runs on any [`Lanes`]. Implementations of `run` must be `#[inline(always)]`, or they lose the
 /// vector instructions of the caller.
@@ -180,6 +190,10 @@ impl Lanes for Arrays {
         zip(a, b, |a, b| a * b)
     }
     #[inline(always)]
+    fn div(self, a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        zip(a, b, |a, b| a / b)
+    }
+    #[inline(always)]
     fn mul_add(self, a: [f32; 16], b: [f32; 16], c: [f32; 16]) -> [f32; 16] {
         std::array::from_fn(|i| a[i].mul_add(b[i], c[i]))
     }
@@ -216,6 +230,12 @@ impl Lanes for Arrays {
         zip(p, n, |p, n| f32::from_bits(p.to_bits().wrapping_sub((n as i32 as u32) << 23)))
     }
     #[inline(always)]
+    fn split_exponent(self, a: [f32; 16]) -> ([f32; 16], [f32; 16]) {
+        let offset = a.map(|a| a.to_bits().wrapping_sub(ROOT_HALF));
+        let exponent = offset.map(|o| ((o as i32) >> MANTISSA_BITS) as f32);
+        (exponent, offset.map(|o| f32::from_bits((o & MANTISSA).wrapping_add(ROOT_HALF))))
+    }
+    #[inline(always)]
     fn to_integers(self, a: [f32; 16]) -> [i32; 16] {
         std::array::from_fn(|i| a[i] as i32)
     }
@@ -226,6 +246,10 @@ impl Lanes for Arrays {
     #[inline(always)]
     fn less(self, a: [f32; 16], b: [f32; 16]) -> [bool; 16] {
         zip(a, b, |a, b| a < b)
+    }
+    #[inline(always)]
+    fn both(self, a: [bool; 16], b: [bool; 16]) -> [bool; 16] {
+        std::array::from_fn(|i| a[i] & b[i])
     }
     #[inline(always)]
     fn any(self, mask: [bool; 16]) -> bool {

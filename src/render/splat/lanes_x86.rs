@@ -1,6 +1,6 @@
 //! [`Lanes`] on AVX-512 (one register) and AVX2 (two).
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, MANTISSA, MANTISSA_BITS, ROOT_HALF};
 use pulp::x86::{V3, V4};
 use pulp::{cast, f32x8, f32x16, m32x8};
 
@@ -31,6 +31,10 @@ impl Lanes for V4 {
     #[inline(always)]
     fn mul(self, a: f32x16, b: f32x16) -> f32x16 {
         cast(self.avx512f._mm512_mul_ps(cast(a), cast(b)))
+    }
+    #[inline(always)]
+    fn div(self, a: f32x16, b: f32x16) -> f32x16 {
+        cast(self.avx512f._mm512_div_ps(cast(a), cast(b)))
     }
     #[inline(always)]
     fn mul_add(self, a: f32x16, b: f32x16, c: f32x16) -> f32x16 {
@@ -71,6 +75,15 @@ impl Lanes for V4 {
         cast(self.avx512f._mm512_scalef_ps(cast(p), cast(negated)))
     }
     #[inline(always)]
+    fn split_exponent(self, a: f32x16) -> (f32x16, f32x16) {
+        let ops = self.avx512f;
+        let root_half = cast(self.splat_u32x16(ROOT_HALF));
+        let offset = ops._mm512_sub_epi32(cast(a), root_half);
+        let exponent = ops._mm512_cvtepi32_ps(ops._mm512_srai_epi32::<MANTISSA_BITS>(offset));
+        let mantissa = ops._mm512_and_si512(offset, cast(self.splat_u32x16(MANTISSA)));
+        (cast(exponent), cast(ops._mm512_add_epi32(mantissa, root_half)))
+    }
+    #[inline(always)]
     fn to_integers(self, a: f32x16) -> [i32; 16] {
         cast(self.convert_f32x16_to_i32x16(a))
     }
@@ -81,6 +94,10 @@ impl Lanes for V4 {
     #[inline(always)]
     fn less(self, a: f32x16, b: f32x16) -> pulp::b16 {
         self.cmp_lt_f32x16(a, b)
+    }
+    #[inline(always)]
+    fn both(self, a: pulp::b16, b: pulp::b16) -> pulp::b16 {
+        pulp::b16(a.0 & b.0)
     }
     #[inline(always)]
     fn any(self, mask: pulp::b16) -> bool {
@@ -95,6 +112,8 @@ impl Lanes for V4 {
         self.select_f32x16(mask, a, b)
     }
 }
+
+const SHIFT: i32 = MANTISSA_BITS as i32;
 
 /// Sixteen lanes in two AVX2 registers.
 type Pair<T> = [T; 2];
@@ -138,6 +157,10 @@ impl Lanes for V3 {
         zip(a, b, |a, b| self.mul_f32x8(a, b))
     }
     #[inline(always)]
+    fn div(self, a: Self::F, b: Self::F) -> Self::F {
+        zip(a, b, |a, b| self.div_f32x8(a, b))
+    }
+    #[inline(always)]
     fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
         [self.mul_add_f32x8(a[0], b[0], c[0]), self.mul_add_f32x8(a[1], b[1], c[1])]
     }
@@ -172,9 +195,21 @@ impl Lanes for V3 {
     #[inline(always)]
     fn divide_by_power_of_two(self, p: Self::F, n: Self::F) -> Self::F {
         zip(p, n, |p, n| {
-            let exponent = self.shl_const_u32x8::<23>(cast(self.avx._mm256_cvtps_epi32(cast(n))));
+            let exponent = self.shl_const_u32x8::<SHIFT>(cast(self.avx._mm256_cvtps_epi32(cast(n))));
             cast(self.avx2._mm256_sub_epi32(cast(p), cast(exponent)))
         })
+    }
+    #[inline(always)]
+    fn split_exponent(self, a: Self::F) -> (Self::F, Self::F) {
+        let (avx, avx2) = (self.avx, self.avx2);
+        let root_half = cast(self.splat_u32x8(ROOT_HALF));
+        let offset = map(a, |a| avx2._mm256_sub_epi32(cast(a), root_half));
+        let exponent = map(offset, |o| cast(avx._mm256_cvtepi32_ps(avx2._mm256_srai_epi32::<SHIFT>(o))));
+        let mantissa = map(offset, |o| {
+            let mantissa = avx2._mm256_and_si256(o, cast(self.splat_u32x8(MANTISSA)));
+            cast(avx2._mm256_add_epi32(mantissa, root_half))
+        });
+        (exponent, mantissa)
     }
     #[inline(always)]
     fn to_integers(self, a: Self::F) -> [i32; 16] {
@@ -190,6 +225,10 @@ impl Lanes for V3 {
     #[inline(always)]
     fn less(self, a: Self::F, b: Self::F) -> Self::M {
         zip(a, b, |a, b| self.cmp_lt_f32x8(a, b))
+    }
+    #[inline(always)]
+    fn both(self, a: Self::M, b: Self::M) -> Self::M {
+        zip(a, b, |a, b| cast(self.avx2._mm256_and_si256(cast(a), cast(b))))
     }
     #[inline(always)]
     fn any(self, mask: Self::M) -> bool {

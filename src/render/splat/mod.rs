@@ -29,6 +29,7 @@ mod profile;
 mod project;
 mod reach;
 mod strip;
+mod wide;
 
 pub use lanes::SimdLevel;
 pub use profile::{Phase, PhaseTimes};

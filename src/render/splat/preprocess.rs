@@ -3,7 +3,8 @@
 use super::bin::{Bins, Grid};
 use super::colour;
 use super::lanes::{Kernel, Lanes};
-use super::project::{Ellipse, FIELDS, HALF_LOG2_E, Projected, VISIBLE, View, project};
+use super::project::{Ellipse, HALF_LOG2_E, Projected, View, project};
+use super::wide::Wide;
 use crate::scene::Posed;
 
 const LANES: usize = 16;
@@ -13,7 +14,7 @@ const LANES: usize = 16;
 #[repr(C, align(64))]
 pub(super) struct Splat {
     pub(super) paint: Paint,
-    pub(super) ellipse: Ellipse,
+    pub(super) ellipse: Ellipse<f32>,
     /// Tile columns that it may touch, half open.
     pub(super) columns: [u16; 2],
 }
@@ -34,7 +35,7 @@ pub(super) struct Paint {
 
 impl Paint {
     #[inline(always)]
-    pub(super) fn new(p: &Projected, colour: [f32; 3]) -> Self {
+    pub(super) fn new(p: &Projected<f32>, colour: [f32; 3]) -> Self {
         let [a, b, c] = p.conic;
         Self {
             mean: p.mean,
@@ -61,7 +62,7 @@ impl Kernel for Preprocess<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self, _: L) {
+    fn run<L: Lanes>(self, l: L) {
         let Self { posed, view, grid, first, splats, bins } = self;
         let coefficients = (posed.sh_degree + 1).pow(2);
         let mut written = 0;
@@ -70,25 +71,26 @@ impl Kernel for Preprocess<'_> {
             let count = LANES.min(splats.len() - start);
             let base = first + start;
             let group = Group::load(posed, base, count);
-            let projected = group.project(view);
-            let bases = group.bases(view);
+            let projected = group.project(l, view).map(|row| row.store());
+            let basis = group.basis(l, view).map(Wide::store);
             for lane in 0..count {
-                if projected[VISIBLE][lane] == 0.0 {
+                if projected.visible[lane] == 0.0 {
                     continue;
                 }
-                let p = Projected::from_fields(std::array::from_fn(|k| projected[k][lane]));
                 let sh = &posed.sh[(base + lane) * coefficients..][..coefficients];
-                let colour = colour::evaluate(sh, &std::array::from_fn(|k| bases[k][lane]));
+                let colour = colour::evaluate(sh, |k| basis[k][lane]);
                 if !colour.iter().all(|c| c.is_finite()) {
                     continue;
                 }
-                let reached = p.reached.map(|t| t as u16);
+                let p = projected.map(|row| row[lane]);
+                let tiles = p.tiles.map(|t| t as u16);
+                let colour = colour::clamped(colour, posed.colour_clamp);
                 splats[written] = Splat {
-                    paint: Paint::new(&p, colour::clamped(colour, posed.colour_clamp)),
+                    paint: Paint::new(&p, colour),
                     ellipse: p.ellipse,
-                    columns: [reached[0], reached[1]],
+                    columns: [tiles[0], tiles[1]],
                 };
-                bins.push((first + written) as u32, p.depth, grid.strips(reached));
+                bins.push((first + written) as u32, p.depth, grid.strips(tiles));
                 written += 1;
             }
         }
@@ -100,7 +102,7 @@ impl Kernel for Preprocess<'_> {
 struct Group {
     means: [[f32; LANES]; 3],
     factors: [[[f32; LANES]; 3]; 3],
-    frames: [[[f32; LANES]; 3]; 3],
+    frames: Option<[[[f32; LANES]; 3]; 3]>,
     opacities: [f32; LANES],
 }
 
@@ -108,57 +110,30 @@ impl Group {
     /// `count` Gaussians from `base` on; the other lanes have opacity 0 and so are culled.
     #[inline(always)]
     fn load(posed: &Posed, base: usize, count: usize) -> Self {
-        let mut group = Self {
-            means: [[0.0; LANES]; 3],
-            factors: [[[0.0; LANES]; 3]; 3],
-            frames: [[[0.0; LANES]; 3]; 3],
-            opacities: [0.0; LANES],
-        };
         let range = base..base + count;
+        let mut means = [[0.0; LANES]; 3];
         for (lane, mean) in posed.means[range.clone()].iter().enumerate() {
-            scatter(&mut group.means, lane, mean.to_array());
+            scatter(&mut means, lane, mean.to_array());
         }
-        for (lane, factor) in posed.factors[range.clone()].iter().enumerate() {
-            scatter_matrix(&mut group.factors, lane, factor);
-        }
-        match &posed.view_frames {
-            Some(frames) => {
-                for (lane, frame) in frames[range.clone()].iter().enumerate() {
-                    scatter_matrix(&mut group.frames, lane, frame);
-                }
-            }
-            None => (0..3).for_each(|k| group.frames[k][k] = [1.0; LANES]),
-        }
-        group.opacities[..count].copy_from_slice(&posed.opacities[range]);
-        group
+        let mut opacities = [0.0; LANES];
+        opacities[..count].copy_from_slice(&posed.opacities[range.clone()]);
+        let factors = transposed(&posed.factors[range.clone()]);
+        let frames = posed.view_frames.as_ref().map(|frames| transposed(&frames[range]));
+        Self { means, factors, frames, opacities }
     }
 
     #[inline(always)]
-    fn project(&self, view: &View) -> [[f32; LANES]; FIELDS] {
-        let mut rows = [[0.0; LANES]; FIELDS];
-        for lane in 0..LANES {
-            let mean = self.means.map(|row| row[lane]);
-            let factor = self.factors.map(|column| column.map(|row| row[lane]));
-            let fields = project(view, mean, factor, self.opacities[lane]).fields();
-            for (row, field) in rows.iter_mut().zip(fields) {
-                row[lane] = field;
-            }
-        }
-        rows
+    fn project<L: Lanes>(&self, l: L, view: &View) -> Projected<Wide<L>> {
+        let load = |row: [f32; LANES]| Wide::load(l, &row);
+        let factors = self.factors.map(|column| column.map(load));
+        project(view, self.means.map(load), factors, load(self.opacities))
     }
 
     #[inline(always)]
-    fn bases(&self, view: &View) -> [[f32; LANES]; 16] {
-        let mut rows = [[0.0; LANES]; 16];
-        for lane in 0..LANES {
-            let mean = self.means.map(|row| row[lane]);
-            let frame = self.frames.map(|column| column.map(|row| row[lane]));
-            let basis = colour::basis(colour::direction(mean, view.position, frame));
-            for (row, value) in rows.iter_mut().zip(basis) {
-                row[lane] = value;
-            }
-        }
-        rows
+    fn basis<L: Lanes>(&self, l: L, view: &View) -> [Wide<L>; 16] {
+        let load = |row: [f32; LANES]| Wide::load(l, &row);
+        let frames = self.frames.map(|frames| frames.map(|column| column.map(load)));
+        colour::basis(colour::direction(self.means.map(load), view.position, frames))
     }
 }
 
@@ -170,8 +145,12 @@ fn scatter(rows: &mut [[f32; LANES]; 3], lane: usize, values: [f32; 3]) {
 }
 
 #[inline(always)]
-fn scatter_matrix(rows: &mut [[[f32; LANES]; 3]; 3], lane: usize, matrix: &glam::Mat3) {
-    for (rows, column) in rows.iter_mut().zip(matrix.to_cols_array_2d()) {
-        scatter(rows, lane, column);
+fn transposed(matrices: &[glam::Mat3]) -> [[[f32; LANES]; 3]; 3] {
+    let mut rows = [[[0.0; LANES]; 3]; 3];
+    for (lane, matrix) in matrices.iter().enumerate() {
+        for (rows, column) in rows.iter_mut().zip(matrix.to_cols_array_2d()) {
+            scatter(rows, lane, column);
+        }
     }
+    rows
 }

@@ -5,8 +5,9 @@
 
 use super::bin::STRIP_TILES;
 use super::lanes::Lanes;
-use super::preprocess::{Paint, Splat};
+use super::preprocess::Splat;
 use super::project::{SAFETY, TILE};
+use super::wide::Wide;
 
 /// Side of a block, pixels.
 pub(super) const BLOCK: usize = 4;
@@ -15,18 +16,29 @@ pub(super) const COLUMNS: usize = STRIP_TILES * BLOCKS_PER_TILE;
 const BLOCKS_PER_TILE: usize = TILE / BLOCK;
 /// Splats that are taken at a time: bounds the lists' memory, and lets a strip that is done stop early.
 pub(super) const SEGMENT: usize = 4096;
-/// Places after the lists' end that filling may overwrite.
+/// Blocks that a splat is entered into without a branch.
+const AT_ONCE: usize = 4;
+/// Places after each list's end that filling may overwrite.
 const SLACK: usize = 1;
+/// One place per value of a byte.
+const NEXT: usize = 256;
 
 /// A run of a strip's splats, in drawing order, and where they reach.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Segment {
-    pub(super) paints: Vec<Paint>,
+    pub(super) splats: Vec<Splat>,
     bounds: Vec<Bounds>,
-    /// Per splat, in the current band: first block in the low byte, end of the blocks above it.
-    spans: Vec<u32>,
+    spans: Vec<u16>,
+    /// Of all blocks of the band, one after the other.
     lists: Vec<u16>,
-    ends: Vec<u32>,
+    /// Where each block's list ends.
+    next: [u32; NEXT],
+}
+
+impl Default for Segment {
+    fn default() -> Self {
+        Self { splats: Vec::new(), bounds: Vec::new(), spans: Vec::new(), lists: Vec::new(), next: [0; NEXT] }
+    }
 }
 
 /// Sixteen splats' ellipses, relative to the strip, one number of each per row.
@@ -45,36 +57,30 @@ struct Bounds {
 
 impl Segment {
     /// Takes splats in drawing order; the strip begins at tile column `first_tile` and pixel row `top`.
-    pub(super) fn load<'a>(
-        &mut self,
-        splats: impl Iterator<Item = &'a Splat>,
-        first_tile: usize,
-        top: usize,
-    ) {
-        self.paints.clear();
-        self.bounds.clear();
-        let left = (first_tile * TILE) as f32;
-        let top = top as f32;
+    #[inline(always)]
+    pub(super) fn load(&mut self, splats: impl Iterator<Item = Splat>, first_tile: usize, top: usize) {
+        // A loop that only copies keeps as many cache misses in flight as there can be.
+        self.splats.clear();
+        self.splats.extend(splats);
+        let (left, top) = ((first_tile * TILE) as f32, top as f32);
         let block = |tile: u16| {
             let within = usize::from(tile).saturating_sub(first_tile).min(STRIP_TILES);
             (within * BLOCKS_PER_TILE) as f32
         };
-        for (i, splat) in splats.enumerate() {
-            let lane = i % 16;
-            if lane == 0 {
-                self.bounds.push(Bounds::default());
+        self.bounds.clear();
+        for group in self.splats.chunks(16) {
+            let mut b = Bounds::default();
+            for (lane, splat) in group.iter().enumerate() {
+                b.x[lane] = splat.paint.mean[0] - left;
+                b.y[lane] = splat.paint.mean[1] - top;
+                b.slope[lane] = splat.ellipse.slope;
+                b.bend[lane] = splat.ellipse.bend;
+                b.half_width_squared[lane] = splat.ellipse.half_width_squared;
+                b.rightmost[lane] = splat.ellipse.rightmost;
+                b.first_block[lane] = block(splat.columns[0]);
+                b.end_block[lane] = block(splat.columns[1]);
             }
-            let last = self.bounds.len() - 1;
-            let b = &mut self.bounds[last];
-            b.x[lane] = splat.paint.mean[0] - left;
-            b.y[lane] = splat.paint.mean[1] - top;
-            b.slope[lane] = splat.ellipse.slope;
-            b.bend[lane] = splat.ellipse.bend;
-            b.half_width_squared[lane] = splat.ellipse.half_width_squared;
-            b.rightmost[lane] = splat.ellipse.rightmost;
-            b.first_block[lane] = block(splat.columns[0]);
-            b.end_block[lane] = block(splat.columns[1]);
-            self.paints.push(splat.paint);
+            self.bounds.push(b);
         }
     }
 
@@ -84,30 +90,31 @@ impl Segment {
         self.spans.clear();
         let top = (band * BLOCK) as f32;
         for bounds in &self.bounds {
-            self.spans.extend(spans(l, bounds, top).map(|span| span as u32));
+            self.spans.extend(spans(l, bounds, top).map(|span| span as u16));
         }
-        self.spans.truncate(self.paints.len());
+        self.spans.truncate(self.splats.len());
         self.fill_lists();
     }
 
-    /// Splats that reach a block of the band, in drawing order, as indices into `paints`.
+    /// Splats that reach a block of the band, in drawing order, as indices into `splats`.
     #[inline(always)]
     pub(super) fn list(&self, column: usize) -> &[u16] {
-        let start = if column == 0 { 0 } else { self.ends[column - 1] as usize + SLACK };
-        &self.lists[start..self.ends[column] as usize]
+        let start = if column == 0 { 0 } else { self.next[column - 1] as usize + SLACK };
+        &self.lists[start..self.next[column] as usize]
     }
 
     #[inline(always)]
     fn fill_lists(&mut self) {
-        // Differences of the counts, then starts; filling turns them into ends.
-        let mut next = [0_u32; COLUMNS + 1];
+        // Differences of the counts, then starts; filling turns them into ends. An index of 8 bits cannot miss the array.
+        let next = &mut self.next;
+        *next = [0; NEXT];
         for &span in &self.spans {
-            let (first, end) = blocks_of(span);
-            next[first] = next[first].wrapping_add(1);
-            next[end] = next[end].wrapping_sub(1);
+            let [first, end] = span.to_le_bytes();
+            next[usize::from(first)] = next[usize::from(first)].wrapping_add(1);
+            next[usize::from(end)] = next[usize::from(end)].wrapping_sub(1);
         }
         let (mut count, mut start) = (0_u32, 0_u32);
-        for slot in &mut next {
+        for slot in &mut next[..COLUMNS + AT_ONCE] {
             count = count.wrapping_add(*slot);
             *slot = start;
             start += count + SLACK as u32;
@@ -117,47 +124,46 @@ impl Segment {
             self.lists.resize(total, 0);
         }
         for (i, &span) in self.spans.iter().enumerate() {
-            let (first, end) = blocks_of(span);
-            for slot in &mut next[first..end] {
+            let [first, end] = span.to_le_bytes();
+            // Most splats reach few blocks. Writing a fixed number of places, and moving on only in the lists that are
+            // reached, has no branch to predict; a place past a list's end is its slack.
+            for column in first..first + AT_ONCE as u8 {
+                let slot = &mut next[usize::from(column)];
+                self.lists[*slot as usize] = i as u16;
+                *slot += u32::from(column < end);
+            }
+            for column in first + AT_ONCE as u8..end {
+                let slot = &mut next[usize::from(column)];
                 self.lists[*slot as usize] = i as u16;
                 *slot += 1;
             }
         }
-        self.ends.clear();
-        self.ends.extend_from_slice(&next[..COLUMNS]);
     }
 }
 
-#[inline(always)]
-fn blocks_of(span: u32) -> (usize, usize) {
-    ((span % 256) as usize, (span / 256) as usize)
-}
-
-/// First block and 256 times the end block of each splat in the band whose first pixel row is `top`; 0 where it does not
-/// reach the band.
+/// First block in the low byte and end of the blocks in the high byte, of each splat in the band whose first pixel row is
+/// `top`; 0 where it does not reach the band.
 #[inline(always)]
 fn spans<L: Lanes>(l: L, b: &Bounds, top: f32) -> [i32; 16] {
-    let load = |row: &[f32; 16]| l.load(row);
-    let zero = l.splat(0.0);
-    let low = l.sub(l.splat(top - SAFETY), load(&b.y));
-    let high = l.add(low, l.splat((BLOCK - 1) as f32 + 2.0 * SAFETY));
-    let within = |dy: L::F| l.max(low, l.min(high, dy));
+    let load = |row: &[f32; 16]| Wide::load(l, row);
+    let n = |value: f32| Wide::splat(l, value);
+    let low = n(top - SAFETY) - load(&b.y);
+    let high = low + n((BLOCK - 1) as f32 + 2.0 * SAFETY);
+    let within = |dy: Wide<L>| dy.min(high).max(low);
     let (bend, width2) = (load(&b.bend), load(&b.half_width_squared));
     // Half the row's width, squared: negative where the ellipse does not reach the row.
-    let square = |dy: L::F| l.neg_mul_add(bend, l.mul(dy, dy), width2);
-    let right_dy = within(load(&b.rightmost));
-    let left_dy = within(l.sub(zero, load(&b.rightmost)));
-    let half = |dy: L::F| l.sqrt(l.max(square(dy), zero));
+    let square = |dy: Wide<L>| bend.neg_mul_add(dy * dy, width2);
+    let half = |dy: Wide<L>| square(dy).max(n(0.0)).sqrt();
+    let (right_dy, left_dy) = (within(load(&b.rightmost)), within(-load(&b.rightmost)));
     let (slope, x) = (load(&b.slope), load(&b.x));
-    let right = l.add(l.mul_add(slope, right_dy, x), half(right_dy));
-    let left = l.sub(l.mul_add(slope, left_dy, x), half(left_dy));
-    let quarter = l.splat(1.0 / BLOCK as f32);
-    let first = l.ceil(l.mul(l.sub(left, l.splat((BLOCK - 1) as f32 + SAFETY)), quarter));
-    let end = l.add(l.floor(l.mul(l.add(right, l.splat(SAFETY)), quarter)), l.splat(1.0));
-    let first = l.max(first, load(&b.first_block));
-    let end = l.min(end, load(&b.end_block));
-    let packed = l.mul_add(end, l.splat(256.0), first);
-    let misses = l.less(square(within(zero)), zero);
-    let reached = l.keep(l.less(first, end), packed);
-    l.to_integers(l.select(misses, zero, reached))
+    let right = slope.mul_add(right_dy, x) + half(right_dy);
+    let left = slope.mul_add(left_dy, x) - half(left_dy);
+    let per_block = n(1.0 / BLOCK as f32);
+    let first = ((left - n((BLOCK - 1) as f32 + SAFETY)) * per_block).ceil();
+    let end = ((right + n(SAFETY)) * per_block).floor() + n(1.0);
+    let first = first.max(load(&b.first_block));
+    let end = end.min(load(&b.end_block));
+    let packed = end.mul_add(n(256.0), first);
+    let misses = square(within(n(0.0))).less(n(0.0));
+    misses.select(n(0.0), first.less(end).keep(packed)).to_integers()
 }

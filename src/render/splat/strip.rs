@@ -78,7 +78,7 @@ impl DrawStrip<'_, '_> {
             blocks.extend((0..COLUMNS).map(|column| Block::new(left + column * BLOCK)));
         }
         for run in entries.chunks(SEGMENT) {
-            segment.load(run.iter().map(|&e| &self.splats[splat_of(e)]), self.column * STRIP_TILES, top);
+            segment.load(run.iter().map(|&e| self.splats[splat_of(e)]), self.column * STRIP_TILES, top);
             clock.lap(Phase::Bin);
             for (band, blocks) in blocks.chunks_mut(COLUMNS).enumerate() {
                 segment.list_band(l, band);
@@ -86,7 +86,7 @@ impl DrawStrip<'_, '_> {
                 for (column, block) in blocks[..columns].iter_mut().enumerate() {
                     let list = segment.list(column);
                     if !list.is_empty() && !block.is_done() {
-                        block.blend(l, top + band * BLOCK, list, &segment.paints);
+                        block.blend(l, top + band * BLOCK, list, &segment.splats);
                     }
                 }
                 clock.lap(Phase::Blend);
