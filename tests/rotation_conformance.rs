@@ -1,6 +1,7 @@
 //! Rotation averaging and projections against reference values: `fixtures/rotation`, `fixtures/power_iteration`,
 //! `fixtures/goldens`. Every solver in both precisions; every case is counted.
 #![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::print_stdout, reason = "reports the worst errors under --nocapture")]
 
 mod support;
 

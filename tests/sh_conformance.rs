@@ -1,5 +1,6 @@
 //! Spherical harmonics against reference values: `fixtures/sh`, `fixtures/goldens`.
 #![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::print_stdout, reason = "reports the worst errors under --nocapture")]
 
 mod support;
 
