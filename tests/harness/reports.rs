@@ -452,6 +452,9 @@ fn results_do_not_depend_on_the_order_of_frames_or_on_time() {
     assert!(!plain.contains("seconds"));
 }
 
+/// How a table is damaged, and the complaint.
+type Damage = (fn(&mut Table), &'static str);
+
 #[test]
 fn results_read_back_and_other_versions_are_refused() {
     let results = results(&table_7(), with_holes);
@@ -463,6 +466,18 @@ fn results_read_back_and_other_versions_are_refused() {
     let error = Results::from_json(&text.replacen("\"schema\": 1", "\"schema\": 9", 1)).unwrap_err();
     assert_eq!(error, "schema: 9; expected 1, which this program reads");
     assert!(Results::from_json("{}").unwrap_err().contains("missing field `schema`"));
+    let damaged: [Damage; 4] = [
+        (|t| t.rows[1].cells[0].notes.push(99), "table `table7`: rows[1]: note 99; expected below 4"),
+        (|t| t.rows[0].cells.truncate(1), "rows[0]: 2 labels and 1 cells; expected 2 (at least 1) and 4"),
+        (|t| t.rows[0].labels.clear(), "rows[0]: 0 labels and 4 cells"),
+        (|t| t.comparisons[0].differences[0].decimals = usize::MAX, "expected at most 12"),
+    ];
+    for (damage, message) in damaged {
+        let mut results = results.clone();
+        damage(&mut results.tables[0].table);
+        let error = Results::from_json(&results.to_json()).unwrap_err();
+        assert!(error.contains(message), "{error}");
+    }
 }
 
 /// `reports/SCHEMA.md` names every key that a document can have.
