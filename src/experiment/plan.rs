@@ -171,7 +171,8 @@ impl Builder<'_> {
         let variants: Vec<(usize, &Variant)> = (experiment.variants.iter().enumerate())
             .filter(|(_, variant)| wanted.is_empty() || wanted.contains(&variant.id))
             .collect();
-        for (row_index, row) in rows.iter().enumerate().filter(|(_, row)| row.missing.is_none()) {
+        let with_data = |(_, row): &(usize, &DataRow)| row.missing.is_none() && !variants.is_empty();
+        for (row_index, row) in rows.iter().enumerate().filter(with_data) {
             let prepared = variants
                 .iter()
                 .map(|&(v, variant)| self.prepare(experiment, v, variant, row))

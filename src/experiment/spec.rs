@@ -257,9 +257,14 @@ impl Experiment {
                     && v.sh_degree == model.sh_degree
             };
             if !extended.variants.iter().any(known) {
+                let taken = extended.variants.iter().any(|variant| variant.label == preset.title);
                 extended.variants.push(Variant {
                     id: format!("{ADDED_VARIANT}{}", preset.id),
-                    label: preset.title.to_owned(),
+                    label: if taken {
+                        format!("{} ({})", preset.title, preset.id)
+                    } else {
+                        preset.title.to_owned()
+                    },
                     paper: None,
                     strategy: Some(preset.id.to_owned()),
                     ..model.clone()

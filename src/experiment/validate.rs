@@ -35,7 +35,9 @@ pub(super) fn experiment(e: &Experiment, file: &str) -> Result<(), Error> {
     }
     distinct_in(file, "columns.metric", e.columns.iter().map(|c| c.metric.id()))?;
     distinct_in(file, "variants.id", e.variants.iter().map(|v| v.id.as_str()))?;
-    distinct_in(file, "sequences", e.sequences.iter().map(String::as_str))?;
+    distinct_in(file, "variants.label", e.variants.iter().map(|v| v.label.as_str()))?;
+    let average = e.average.iter().map(|average| average.label.as_str());
+    distinct_in(file, "sequences, average.label", e.sequences.iter().map(String::as_str).chain(average))?;
     distinct_in(file, "splits.sequence", e.splits.iter().map(|s| s.sequence.as_str()))?;
     if e.variant(&e.baseline).is_none() {
         return fail("baseline", format!("`{}`", e.baseline), "the id of one of the variants");

@@ -74,7 +74,8 @@ pub struct Move {
     pub baseline: f64,
     /// In the candidate.
     pub candidate: f64,
-    /// Candidate minus baseline over the tolerance; infinite where the tolerance is 0 or one value is infinite.
+    /// Candidate minus baseline over the tolerance; infinite (`null` in JSON) where the tolerance is 0
+    /// or one value is infinite.
     pub tolerances: f64,
 }
 

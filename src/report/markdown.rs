@@ -7,7 +7,7 @@ pub fn markdown(table: &Table) -> String {
     let mut text = format!("## {}\n\n{}", escape(&table.title), body(table));
     if let Some(paper) = &table.paper {
         let summary = "the paper's values on its data and avatars (not comparable with a stand-in's)";
-        let heading = format!("{}: {summary}", escape(&paper.title));
+        let heading = format!("{}: {summary}", paper.title.replace('<', "&lt;"));
         text += &format!("\n<details>\n<summary>{heading}</summary>\n\n{}\n</details>\n", body(paper));
     }
     text

@@ -46,7 +46,9 @@ impl Results {
         if versioned.schema != SCHEMA {
             return Err(format!("schema: {}; expected {SCHEMA}, which this program reads", versioned.schema));
         }
-        serde_json::from_str(text).map_err(|error| error.to_string())
+        let results: Self = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        results.tables.iter().try_for_each(|table| table.table.check())?;
+        Ok(results)
     }
 
     /// Frames that were planned and have no score, over all tables.

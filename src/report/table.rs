@@ -35,7 +35,35 @@ pub struct Table {
     pub paper: Option<Box<Table>>,
 }
 
+/// Most digits after the point that a document may ask for.
+const MOST_DECIMALS: usize = 12;
+
 impl Table {
+    /// Checks what formats rely on, for a table that was read from a file.
+    ///
+    /// # Errors
+    /// One line that names the table and what is wrong.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let wrong = |what: String| Err(format!("table `{}`: {what}", self.id));
+        let decimals = self.columns.iter().map(|column| column.decimals);
+        let differences = self.comparisons.iter().flat_map(|c| &c.differences).map(|d| d.decimals);
+        if let Some(n) = decimals.chain(differences).find(|&n| n > MOST_DECIMALS) {
+            return wrong(format!("decimals: {n}; expected at most {MOST_DECIMALS}"));
+        }
+        for (r, row) in self.rows.iter().enumerate() {
+            let (labels, cells) = (row.labels.len(), row.cells.len());
+            if labels != self.labels.len() || labels == 0 || cells != self.columns.len() {
+                let expected = format!("{} (at least 1) and {}", self.labels.len(), self.columns.len());
+                return wrong(format!("rows[{r}]: {labels} labels and {cells} cells; expected {expected}"));
+            }
+            let notes = row.cells.iter().flat_map(|cell| &cell.notes);
+            if let Some(note) = notes.into_iter().find(|&&note| note >= self.notes.len()) {
+                return wrong(format!("rows[{r}]: note {note}; expected below {}", self.notes.len()));
+            }
+        }
+        self.paper.as_ref().map_or(Ok(()), |paper| paper.check())
+    }
+
     /// The value as JSON, indented, with a final newline.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("keys are strings and every number is finite") + "\n"

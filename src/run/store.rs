@@ -12,10 +12,10 @@
 
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Records};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Version of the file format.
@@ -53,18 +53,27 @@ pub enum Error {
     },
     /// One key with two results: the program is not deterministic, or a code version was not raised.
     #[error(
-        "{first_label}: two results for one key {key}: {first} and {second}; expected equal ones: delete the stale file, or raise the code version that changed the numbers"
+        "{label}: two results for one key: {} at {first_at}, {} at {second_at}; expected equal ones: delete the stale \
+         file, or raise the code version that moved the numbers",
+        show(.first), show(.second)
     )]
     Conflict {
-        /// The key.
-        key: String,
         /// What the frame is.
-        first_label: String,
-        /// One result.
-        first: String,
+        label: String,
+        /// Where the one result is: file and line, or "this run".
+        first_at: String,
+        /// The one result.
+        first: Box<Outcome>,
+        /// Where the other is.
+        second_at: String,
         /// The other.
-        second: String,
+        second: Box<Outcome>,
     },
+}
+
+/// A result as the store writes it.
+fn show(outcome: &Outcome) -> String {
+    serde_json::to_string(outcome).expect("every field serialises")
 }
 
 /// A line of the file.
@@ -97,7 +106,6 @@ struct Contents {
 pub struct Store {
     path: PathBuf,
     file: File,
-    length: u64,
     records: Records,
 }
 
@@ -108,14 +116,14 @@ impl Store {
     /// If the file cannot be read or written, is not a store, or holds two results for one key.
     pub fn open(path: &Path, plan: &str) -> Result<Self, Error> {
         let io = |source| Error::Io { path: path.into(), source };
-        let mut options = OpenOptions::new();
-        let mut file = options.read(true).write(true).create(true).truncate(false).open(path).map_err(io)?;
+        let mut file = OpenOptions::new().read(true).append(true).create(true).open(path).map_err(io)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(io)?;
         let contents = parse(&bytes, path)?;
-        file.set_len(contents.whole).map_err(io)?;
-        file.seek(SeekFrom::Start(contents.whole)).map_err(io)?;
-        let mut store = Self { path: path.into(), file, length: contents.whole, records: contents.records };
+        if contents.whole < bytes.len() as u64 {
+            cut(path, contents.whole).map_err(io)?;
+        }
+        let mut store = Self { path: path.into(), file, records: contents.records };
         if contents.plan.as_deref() != Some(plan) {
             store.write(&[Line::Header(Header { schema: SCHEMA, plan: plan.into() })])?;
         }
@@ -137,10 +145,14 @@ impl Store {
     /// # Errors
     /// If the disk refuses (the file is then as before), or a record contradicts an earlier one.
     pub fn append(&mut self, records: &[FrameRecord]) -> Result<(), Error> {
-        let mut touched: Records =
-            records.iter().filter_map(|new| self.records.get_key_value(&new.key)).map(own).collect();
+        let mut touched = Records::new();
         for record in records {
-            insert(&mut touched, record.clone())?;
+            if let (false, Some(earlier)) = (touched.contains_key(&record.key), self.records.get(&record.key))
+            {
+                touched.insert(record.key.clone(), earlier.clone());
+            }
+            let at = || [self.path.display().to_string(), "this run".to_owned()];
+            insert(&mut touched, record.clone()).map_err(|clash| clash.at(at()))?;
         }
         let lines: Vec<Line> = records.iter().cloned().map(Line::Frame).collect();
         self.write(&lines)?;
@@ -155,20 +167,19 @@ impl Store {
             text += &serde_json::to_string(line).expect("every field serialises");
             text.push('\n');
         }
-        let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.flush());
-        if let Err(source) = written {
-            // If even that fails, the torn line is dropped by the next reader.
-            let _ =
-                self.file.set_len(self.length).and_then(|()| self.file.seek(SeekFrom::Start(self.length)));
-            return Err(Error::Io { path: self.path.clone(), source });
-        }
-        self.length += text.len() as u64;
-        Ok(())
+        let io = |source| Error::Io { path: self.path.clone(), source };
+        let before = self.file.metadata().map_err(io)?.len();
+        self.file.write_all(text.as_bytes()).and_then(|()| self.file.flush()).map_err(|source| {
+            // Should even this fail, the next reader drops the torn line.
+            let _ = cut(&self.path, before);
+            io(source)
+        })
     }
 }
 
-fn own((key, record): (&String, &FrameRecord)) -> (String, FrameRecord) {
-    (key.clone(), record.clone())
+/// Cuts a file off after a number of bytes.
+fn cut(path: &Path, length: u64) -> io::Result<()> {
+    OpenOptions::new().write(true).open(path)?.set_len(length)
 }
 
 /// Reads a store without touching it.
@@ -186,9 +197,14 @@ pub fn read(path: &Path) -> Result<Records, Error> {
 /// If a store cannot be read, or two of them contradict each other.
 pub fn merge<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<Records, Error> {
     let mut all = Records::new();
+    let mut origins: BTreeMap<String, &Path> = BTreeMap::new();
     for path in paths {
-        for (_, record) in read(path)? {
-            insert(&mut all, record)?;
+        for (key, record) in read(path)? {
+            insert(&mut all, record).map_err(|clash| {
+                let first = origins.get(&key).map_or_else(String::new, |path| path.display().to_string());
+                clash.at([first, path.display().to_string()])
+            })?;
+            origins.entry(key).or_insert(path);
         }
     }
     Ok(all)
@@ -211,8 +227,23 @@ pub fn outstanding<'a>(jobs: impl IntoIterator<Item = &'a Job>, records: &Record
     left
 }
 
+/// Two scores for one key.
+struct Clash {
+    label: String,
+    first: Outcome,
+    second: Outcome,
+}
+
+impl Clash {
+    /// The error, with the places of the two.
+    fn at(self, [first_at, second_at]: [String; 2]) -> Error {
+        let Self { label, first, second } = self;
+        Error::Conflict { label, first_at, first: Box::new(first), second_at, second: Box::new(second) }
+    }
+}
+
 /// Adds a record: a score replaces a failure and repeats an equal score; a failure never replaces a score.
-fn insert(records: &mut Records, record: FrameRecord) -> Result<(), Error> {
+fn insert(records: &mut Records, record: FrameRecord) -> Result<(), Box<Clash>> {
     let mut slot = match records.entry(record.key.clone()) {
         Entry::Vacant(slot) => {
             slot.insert(record);
@@ -220,15 +251,11 @@ fn insert(records: &mut Records, record: FrameRecord) -> Result<(), Error> {
         }
         Entry::Occupied(slot) => slot,
     };
-    match (&slot.get().outcome, &record.outcome) {
-        (Outcome::Scored { .. }, Outcome::Scored { .. }) if *slot.get() != record => {
-            let show = |r: &FrameRecord| serde_json::to_string(&r.outcome).expect("every field serialises");
-            return Err(Error::Conflict {
-                key: record.key.clone(),
-                first_label: slot.get().label.clone(),
-                first: show(slot.get()),
-                second: show(&record),
-            });
+    let known = slot.get();
+    match (&known.outcome, &record.outcome) {
+        (Outcome::Scored { .. }, Outcome::Scored { .. }) if *known != record => {
+            let (label, first) = (known.label.clone(), known.outcome.clone());
+            return Err(Box::new(Clash { label, first, second: record.outcome }));
         }
         (Outcome::Scored { .. }, _) => {}
         (Outcome::Error(_), _) => {
@@ -252,6 +279,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Contents, Error> {
         return Err(invalid(1, "not a results store".into(), &format!("a line that begins with {OPENING}")));
     }
     let mut contents = Contents { records: Records::new(), plan: None, whole: whole as u64 };
+    let mut scored_in: BTreeMap<String, usize> = BTreeMap::new();
     let lines = bytes[..whole].split_inclusive(|&byte| byte == b'\n');
     for (number, line) in (1..).zip(lines) {
         let line: Line = serde_json::from_slice(line)
@@ -262,7 +290,16 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Contents, Error> {
                 return Err(invalid(number, problem, &format!("{SCHEMA}, which this program writes")));
             }
             Line::Header(header) => contents.plan = Some(header.plan),
-            Line::Frame(record) => insert(&mut contents.records, record)?,
+            Line::Frame(record) => {
+                let at = |line: usize| format!("{}:{line}", path.display());
+                let (key, scored) = (record.key.clone(), matches!(record.outcome, Outcome::Scored { .. }));
+                insert(&mut contents.records, record).map_err(|clash| {
+                    clash.at([at(scored_in.get(&key).copied().unwrap_or_default()), at(number)])
+                })?;
+                if scored {
+                    scored_in.entry(key).or_insert(number);
+                }
+            }
         }
     }
     Ok(contents)

@@ -250,6 +250,8 @@ fn wrong_files_are_refused_by_name_and_key() {
             "baseline: `m`; expected the id of one of the variants",
         ),
         ("id = \"quaternions\"", "id = \"matrices\"", "variants.id: `matrices` twice"),
+        ("label = \"Quaternions\"", "label = \"Matrices\"", "variants.label: `Matrices` twice"),
+        ("label = \"Mean\"", "label = \"anna\"", "sequences, average.label: `anna` twice"),
         ("metric = \"ssim\"", "metric = \"psnr\"", "columns.metric: `psnr` twice"),
         ("metric = \"ssim\"", "metric = \"speed\"", "unknown variant `speed`"),
         ("decimals = 3", "decimals = 99", "columns[1].decimals: 99; expected at most 12"),

@@ -2,9 +2,10 @@
 
 use skinsplat::experiment::{
     AvatarFile, Capture, Dataset, Experiment, FrameInfo, FrameRecord, Options, Outcome, Plan, Profile,
-    Records, Role, Seconds, SequenceInfo, SubjectInfo, Subset,
+    Records, Role, Seconds, SequenceInfo, SubjectInfo, Subset, plan,
 };
 use skinsplat::metrics::{FrameScore, Protocol};
+use skinsplat::report::{self, Results, Table};
 
 /// A seventh table: not one of the paper's, on a data set that no code knows.
 pub(super) const TABLE_7: &str = include_str!("table7.toml");
@@ -95,5 +96,32 @@ pub(super) fn run(plan: &Plan) -> Records {
             records.insert(variant.key.clone(), scored(&variant.key, score));
         }
     }
+    records
+}
+
+/// The results of an experiment on its own data.
+pub(super) fn results(experiment: &Experiment, records: impl Fn(&Plan) -> Records) -> Results {
+    let experiments = [experiment.clone()];
+    let plan = plan(&experiments, &[own_data(6)], &options()).unwrap();
+    report::results(&plan, &experiments, &records(&plan)).unwrap()
+}
+
+/// The table of an experiment on its own data.
+pub(super) fn table(experiment: &Experiment, records: impl Fn(&Plan) -> Records) -> Table {
+    results(experiment, records).tables.remove(0).table
+}
+
+/// The made-up scores with a hole: of anna's frames, one failed and one was not run; bob's matrices have no LPIPS and
+/// his quaternions hit one frame exactly.
+pub(super) fn with_holes(plan: &Plan) -> Records {
+    let mut records = run(plan);
+    let key = |job: usize, variant: usize| plan.jobs[job].variants[variant].key.clone();
+    records
+        .insert(key(1, 0), record(&key(1, 0), Outcome::Error("truth: image_0001.png is truncated".into())));
+    records.remove(&key(2, 0));
+    for job in 6..12 {
+        records.insert(key(job, 0), scored(&key(job, 0), score("avatar-v1", 21.0, 0.5, None)));
+    }
+    records.insert(key(7, 1), scored(&key(7, 1), score("avatar-v1", f64::INFINITY, 1.0, Some(0.0))));
     records
 }

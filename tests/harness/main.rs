@@ -5,6 +5,7 @@
 mod support;
 
 mod experiments;
+mod formats;
 mod made_up;
 mod plans;
 mod reports;

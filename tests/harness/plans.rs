@@ -90,6 +90,9 @@ fn avatars_are_shared_by_tables_that_make_the_same_ones() {
     assert!(plan.jobs.iter().flat_map(|job| &job.variants).all(|v| known.contains(v.avatar.as_str())));
 }
 
+/// A change and what it is called.
+type Change<'a> = (&'a str, &'a dyn Fn(&mut Experiment));
+
 /// Everything that a number depends on moves its key, and nothing else does.
 #[test]
 fn keys_follow_what_numbers_depend_on() {
@@ -100,7 +103,7 @@ fn keys_follow_what_numbers_depend_on() {
         planned(&[experiment], &[own_data(3)])
     };
     let first = |plan: &Plan| plan.jobs[0].variants[0].key.clone();
-    let depends: [(&str, &dyn Fn(&mut Experiment)); 6] = [
+    let depends: [Change; 6] = [
         ("protocol", &|e| e.protocol = "haha".into()),
         ("protocol choice", &|e| e.protocol = "avatar-v1+ssim=uniform7".into()),
         ("strategy", &|e| e.variants[0].strategy = Some("face-tbn".into())),
@@ -112,7 +115,7 @@ fn keys_follow_what_numbers_depend_on() {
     for (what, change) in depends {
         assert!(seen.insert(first(&with(change))), "{what}");
     }
-    let free: [(&str, &dyn Fn(&mut Experiment)); 4] = [
+    let free: [Change; 4] = [
         ("id", &|e| e.id = "other".into()),
         ("captions", &|e| e.caption = "Other".into()),
         ("label", &|e| e.variants[0].label = "Other".into()),

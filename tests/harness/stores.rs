@@ -43,7 +43,7 @@ fn what_is_appended_is_read_again() {
     let precise = scored("precise", score("haha", 1.0 / 3.0, 0.1 + 0.2, Some(f64::MIN_POSITIVE)));
     let mut store = Store::open(&path, "plan").unwrap();
     store.append(&[identical.clone(), failed("b")]).unwrap();
-    store.append(&[precise.clone()]).unwrap();
+    store.append(std::slice::from_ref(&precise)).unwrap();
     let expected = by_key(&[identical, failed("b"), precise]);
     assert_eq!(store.records(), &expected);
     assert_eq!(store::read(&path).unwrap(), expected);
@@ -87,6 +87,7 @@ fn equal_results_may_repeat_and_different_ones_may_not() {
         error.contains("label of a") && error.contains("\"psnr\":20.0") && error.contains("\"psnr\":20.5"),
         "{error}"
     );
+    assert!(error.contains("frames.jsonl, ") && error.contains(" at this run"), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), before, "a refused record is not written");
     assert!(!store.records().contains_key("new"));
 
@@ -94,6 +95,12 @@ fn equal_results_may_repeat_and_different_ones_may_not() {
     Store::open(&other, "plan").unwrap().append(&[scored_at("a", 20.5), scored_at("b", 1.0)]).unwrap();
     let error = store::merge([path.as_path(), other.as_path()]).unwrap_err();
     assert!(matches!(error, store::Error::Conflict { .. }), "{error}");
+    let text = error.to_string();
+    assert!(text.contains(path.to_str().unwrap()) && text.contains(other.to_str().unwrap()), "{text}");
+    let both = [std::fs::read(&path).unwrap(), std::fs::read(&other).unwrap()].concat();
+    std::fs::write(&other, both).unwrap();
+    let text = store::read(&other).unwrap_err().to_string();
+    assert!(text.contains("frames.jsonl:2, ") && text.contains("frames.jsonl:5;"), "{text}");
     std::fs::write(&other, written(&[scored_at("a", 20.0), scored_at("b", 1.0)])).unwrap();
     assert_eq!(store::merge([path.as_path(), other.as_path()]).unwrap().len(), 2);
 }
