@@ -32,6 +32,7 @@ mod presets;
 mod rest_faces;
 mod rotate;
 mod spec;
+mod surfel;
 
 pub use bound::BoundAvatar;
 pub use choices::{
