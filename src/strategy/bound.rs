@@ -1,18 +1,21 @@
 //! An avatar bound to a body: everything that does not depend on the pose, computed once.
 
-use super::StrategyError;
 use super::layout::{self, Canonical, Chunk};
 use super::nearest::NearestFace;
 use super::rest_faces::RestFaces;
+use super::{CovarianceChoice, StrategyError, surfel};
 use crate::scene::{Avatar, Binding, FaceBinding, RestBody, SkinWeights};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Where a Gaussian sits on the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seat {
     /// Face index.
     pub(crate) face: u32,
+    /// Its vertices.
+    pub(crate) corners: [u32; 3],
     /// As given for face-bound Gaussians, of the nearest point for others. May leave \[0, 1\].
     pub(crate) barycentric: [f32; 3],
     /// Metres along the interpolated vertex normal; 0 for Gaussians with weights of their own.
@@ -20,6 +23,15 @@ pub(crate) struct Seat {
 }
 
 impl Seat {
+    /// The point on a mesh: `Σ b v + unit(Σ b n) offset`.
+    #[inline]
+    pub(crate) fn point(&self, vertices: &[Vec3], normals: &[Vec3]) -> Vec3 {
+        let [i, j, k] = [self.corners[0] as usize, self.corners[1] as usize, self.corners[2] as usize];
+        let [a, b, c] = self.barycentric;
+        let normal = normals[i] * a + normals[j] * b + normals[k] * c;
+        vertices[i] * a + vertices[j] * b + vertices[k] * c + normal.normalize_or_zero() * self.offset
+    }
+
     /// The barycentric coordinates as weights: cut at zero, summing to one.
     pub(crate) fn weights(&self) -> [f32; 3] {
         let cut = self.barycentric.map(|b| b.max(0.0));
@@ -50,7 +62,8 @@ pub(crate) struct Surface {
 /// * Static Gaussians stay as they are under every strategy.
 #[derive(Clone, Debug)]
 pub struct BoundAvatar {
-    pub(crate) chunks: Vec<Chunk>,
+    chunks: Vec<Chunk>,
+    discs: OnceLock<Vec<Chunk>>,
     pub(crate) means: Vec<Vec3>,
     pub(crate) surface: Option<Surface>,
     pub(crate) moves: Moves,
@@ -104,7 +117,7 @@ impl BoundAvatar {
             Binding::Static => (None, None, Moves::Not),
             Binding::Vertex(_) => (nearest_seats(&gaussians.means, body), None, Moves::ByWeights),
             Binding::Face(binding) => {
-                let seats = given_seats(binding);
+                let seats = given_seats(binding, body);
                 let mixed = mixed_weights(&seats, body)?;
                 (Some(seats), Some(mixed), Moves::WithFaces)
             }
@@ -123,6 +136,7 @@ impl BoundAvatar {
         let canonical = Canonical { means: &means, rotations: &rotations, scales: &scales };
         Ok(Self {
             chunks: layout::chunks(&canonical, weights),
+            discs: OnceLock::new(),
             means,
             surface,
             moves,
@@ -141,6 +155,16 @@ impl BoundAvatar {
     /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
+    }
+
+    /// The Gaussians as a covariance choice reads them. Discs are made when first asked for.
+    pub(crate) fn chunks(&self, choice: CovarianceChoice) -> &[Chunk] {
+        match (choice, &self.surface) {
+            (CovarianceChoice::Surfel, Some(surface)) => {
+                self.discs.get_or_init(|| surfel::discs(&self.chunks, surface))
+            }
+            _ => &self.chunks,
+        }
     }
 
     /// SH coefficients per Gaussian and channel.
@@ -162,18 +186,9 @@ impl Surface {
         let mut vertex_used = vec![false; body.vertices.len()];
         for seat in &seats {
             face_used[seat.face as usize] = true;
-            faces.corners[seat.face as usize].iter().for_each(|&v| vertex_used[v as usize] = true);
+            seat.corners.iter().for_each(|&v| vertex_used[v as usize] = true);
         }
         Self { faces, seats, face_used, vertex_used }
-    }
-
-    /// The point of a seat on a mesh: `Σ b v + unit(Σ b n) offset`.
-    pub(crate) fn point(&self, seat: &Seat, vertices: &[Vec3], normals: &[Vec3]) -> Vec3 {
-        let corners = self.faces.corners[seat.face as usize];
-        let mix = |values: &[Vec3]| -> Vec3 {
-            corners.iter().zip(seat.barycentric).map(|(&corner, b)| values[corner as usize] * b).sum()
-        };
-        mix(vertices) + mix(normals).normalize_or_zero() * seat.offset
     }
 }
 
@@ -181,21 +196,25 @@ fn nearest_seats(means: &[Vec3], body: &RestBody) -> Option<Vec<Seat>> {
     let tree = NearestFace::new(body)?;
     let seat = |mean: &Vec3| {
         let point = tree.nearest(mean.as_dvec3());
-        Seat { face: point.face, barycentric: point.barycentric.map(|b| b as f32), offset: 0.0 }
+        let barycentric = point.barycentric.map(|b| b as f32);
+        Seat { face: point.face, corners: body.faces[point.face as usize], barycentric, offset: 0.0 }
     };
     Some(means.par_iter().map(seat).collect())
 }
 
-fn given_seats(binding: &FaceBinding) -> Vec<Seat> {
+fn given_seats(binding: &FaceBinding, body: &RestBody) -> Vec<Seat> {
     let places = binding.faces.iter().zip(&binding.barycentric).zip(&binding.offsets);
-    places.map(|((&face, &barycentric), &offset)| Seat { face, barycentric, offset }).collect()
+    let seat = |((&face, &barycentric), &offset)| {
+        let corners = body.faces[face as usize];
+        Seat { face, corners, barycentric, offset }
+    };
+    places.map(seat).collect()
 }
 
 fn mixed_weights(seats: &[Seat], body: &RestBody) -> Result<SkinWeights, StrategyError> {
     let row = |seat: &Seat| {
-        let corners = body.faces[seat.face as usize];
         let weights = seat.weights();
-        body.weights.mixed(&[0, 1, 2].map(|k: usize| (corners[k] as usize, f64::from(weights[k]))))
+        body.weights.mixed(&[0, 1, 2].map(|k: usize| (seat.corners[k] as usize, f64::from(weights[k]))))
     };
     let rows: Vec<_> = seats.par_iter().map(row).collect();
     Ok(SkinWeights::from_rows(rows, body.skeleton.num_joints())?)
@@ -205,5 +224,5 @@ fn rest_means(surface: &Surface, body: &RestBody) -> Vec<Vec3> {
     let vertices: Vec<Vec3> = body.vertices.iter().map(|v| v.as_vec3()).collect();
     let normals = crate::scene::body::vertex_normals(&body.vertices, &body.faces);
     let normals: Vec<Vec3> = normals.iter().map(|n| n.as_vec3()).collect();
-    surface.seats.iter().map(|seat| surface.point(seat, &vertices, &normals)).collect()
+    surface.seats.iter().map(|seat| seat.point(&vertices, &normals)).collect()
 }

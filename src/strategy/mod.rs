@@ -33,6 +33,7 @@ mod presets;
 mod rest_faces;
 mod rotate;
 mod spec;
+mod surfel;
 
 pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;

@@ -1,17 +1,18 @@
 //! Canonical avatar and posed body to [`Posed`], a chunk of Gaussians at a time.
 
 use super::blend::Blend;
-use super::bound::{BodyShape, Moves, Surface};
-use super::covariance::{Canonical, factors};
+use super::bound::{BodyShape, Moves};
+use super::covariance::factors;
 use super::joints::Joints;
 use super::layout::{Block, CHUNK, Chunk, LANES, Lanes};
-use super::rotate::{BlockInput, Source, Turn, dual_means, take, turn};
+use super::rotate::{BlockInput, Source, Turn, take, turn};
 use super::{
     BoundAvatar, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
     StrategyError, colour, face_frame,
 };
+use crate::math::Quaternion;
 use crate::scene::{Posed, PosedBody};
-use glam::{Mat3, Vec3};
+use glam::{Mat3, Quat, Vec3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -34,34 +35,24 @@ pub fn pose<'a>(
         let (found, expected) = (shape.to_string(), bound.shape.to_string());
         return Err(StrategyError::OtherBody { found, expected });
     }
-    let n = bound.len();
-    let joints = Joints::new(body);
-    let stays = bound.moves == Moves::Not;
-    let no_faces = || StrategyError::NoFaces { strategy: strategy.to_string() };
-    if strategy.covariance == CovarianceChoice::Surfel && bound.surface.is_none() && !stays {
-        return Err(no_faces());
+    let needs_faces = strategy.rotation.needs_faces() || strategy.covariance == CovarianceChoice::Surfel;
+    if needs_faces && bound.surface.is_none() && bound.moves != Moves::Not {
+        return Err(StrategyError::NoFaces { strategy: strategy.to_string() });
     }
-    let source = match Source::new(strategy.rotation, &joints, body, bound.surface.as_ref()) {
-        Some(source) => source,
-        None if stays => Source::Dual,
-        None => return Err(no_faces()),
+    let joints = Joints::new(body);
+    let source = if reads_rotation(strategy) {
+        Source::new(strategy.rotation, &joints, body, bound.surface.as_ref())
+    } else {
+        Source::Identity
     };
-    let frame = Frame { bound, body, strategy, joints, source };
-
-    let proper = matches!(strategy.covariance, CovarianceChoice::Rotate | CovarianceChoice::Surfel)
-        && strategy.rotation != RotationChoice::Lbs(LbsProjection::MatrixToQuaternionRaw);
-    let rotates_sh = strategy.colour == ColourChoice::RotateSh && bound.sh_degree > 0;
-    let views = match strategy.colour {
-        ColourChoice::ViewBlend | ColourChoice::ViewBlendInverse | ColourChoice::ViewRotation => {
-            bound.sh_degree > 0
-        }
-        ColourChoice::None | ColourChoice::RotateSh => false,
-    };
+    let frame = Frame { bound, body, strategy, joints, source, arch: pulp::Arch::new() };
+    let produces = Produces::of(strategy, bound);
+    let n = bound.len();
     let mut means = vec![Vec3::ZERO; n];
     let mut factors = vec![Mat3::ZERO; n];
-    let mut rotations = proper.then(|| vec![[0.0; 4]; n]);
-    let mut view_frames = views.then(|| vec![Mat3::ZERO; n]);
-    let mut sh = rotates_sh.then(|| vec![[0.0; 3]; bound.sh.len()]);
+    let mut rotations = produces.rotations.then(|| vec![[0.0; 4]; n]);
+    let mut view_frames = produces.view_frames.then(|| vec![Mat3::ZERO; n]);
+    let mut sh = produces.sh.then(|| vec![[0.0; 3]; bound.sh.len()]);
     let outputs = Outputs {
         means: &mut means,
         factors: &mut factors,
@@ -69,12 +60,11 @@ pub fn pose<'a>(
         view_frames: view_frames.as_deref_mut().unwrap_or_default(),
         sh: sh.as_deref_mut().unwrap_or_default(),
     };
-    let arch = pulp::Arch::new();
     let parts = outputs.split(bound.sh_count());
-    bound.chunks.par_iter().zip(parts).enumerate().for_each(|(c, (chunk, outputs))| {
-        arch.dispatch(PoseChunk { arch, frame: &frame, chunk, start: c * CHUNK, outputs });
+    let chunks = bound.chunks(strategy.covariance).par_iter().zip(parts).enumerate();
+    chunks.for_each(|(c, (chunk, outputs))| {
+        PoseChunk { frame: &frame, chunk, start: c * CHUNK, outputs }.run();
     });
-
     Ok(Posed {
         means,
         factors,
@@ -87,20 +77,78 @@ pub fn pose<'a>(
     })
 }
 
+/// False if nothing depends on R: not the means, not the covariance, not the colour.
+fn reads_rotation(strategy: &Strategy) -> bool {
+    let for_covariance = match strategy.covariance {
+        CovarianceChoice::Rotate | CovarianceChoice::Surfel => true,
+        CovarianceChoice::Affine | CovarianceChoice::AffineConjugate => false,
+    };
+    let for_colour = match strategy.colour {
+        ColourChoice::RotateSh | ColourChoice::ViewRotation => true,
+        ColourChoice::None | ColourChoice::ViewBlend | ColourChoice::ViewBlendInverse => false,
+    };
+    let for_means = matches!(
+        strategy.rotation,
+        RotationChoice::DualQuaternion | RotationChoice::FaceFrame(FaceFrame::HahaScaled)
+    );
+    for_covariance || for_colour || for_means
+}
+
+/// Which of the optional outputs a strategy produces. Colours of degree 0 look the same from everywhere.
+struct Produces {
+    rotations: bool,
+    view_frames: bool,
+    sh: bool,
+}
+
+impl Produces {
+    fn of(strategy: &Strategy, bound: &BoundAvatar) -> Self {
+        let raw = strategy.rotation == RotationChoice::Lbs(LbsProjection::MatrixToQuaternionRaw);
+        let rotations = match strategy.covariance {
+            CovarianceChoice::Rotate | CovarianceChoice::Surfel => !raw,
+            CovarianceChoice::Affine | CovarianceChoice::AffineConjugate => false,
+        };
+        let (view_frames, sh) = match strategy.colour {
+            ColourChoice::None => (false, false),
+            ColourChoice::RotateSh => (false, true),
+            ColourChoice::ViewBlend | ColourChoice::ViewBlendInverse | ColourChoice::ViewRotation => {
+                (true, false)
+            }
+        };
+        let seen = bound.sh_degree > 0;
+        Self { rotations, view_frames: view_frames && seen, sh: sh && seen }
+    }
+}
+
 /// What all chunks of a frame share.
 struct Frame<'a> {
     bound: &'a BoundAvatar,
     body: &'a PosedBody<'a>,
     strategy: &'a Strategy,
     joints: Joints,
-    source: Source,
+    source: Source<'a>,
+    arch: pulp::Arch,
+}
+
+impl Frame<'_> {
+    /// HAHA's k over its value at rest; 1 for static Gaussians and on faces without area in either pose.
+    fn growth(&self, gaussian: usize) -> f32 {
+        let Frame { bound, body, source, .. } = self;
+        let (Some(surface), Source::Faces(turns)) = (&bound.surface, source) else { return 1.0 };
+        if turns.of_gaussian(gaussian).is_none() {
+            return 1.0;
+        }
+        let seat = &surface.seats[gaussian];
+        let corners = seat.corners.map(|v| body.mesh().vertices[v as usize]);
+        face_frame::haha_size(&corners) / surface.faces.sizes[seat.face as usize]
+    }
 }
 
 /// Where the results go. Parts that a strategy does not produce are empty.
 struct Outputs<'o> {
     means: &'o mut [Vec3],
     factors: &'o mut [Mat3],
-    rotations: &'o mut [[f32; 4]],
+    rotations: &'o mut [Quaternion<f32>],
     view_frames: &'o mut [Mat3],
     sh: &'o mut [[f32; 3]],
 }
@@ -124,107 +172,83 @@ impl<'o> Outputs<'o> {
     }
 }
 
-/// The work on one chunk, compiled for each instruction set.
+/// The work on one chunk.
 struct PoseChunk<'a, 'o> {
-    arch: pulp::Arch,
     frame: &'a Frame<'a>,
     chunk: &'a Chunk,
+    /// Index of the first Gaussian.
     start: usize,
     outputs: Outputs<'o>,
 }
 
-impl pulp::WithSimd for PoseChunk<'_, '_> {
+/// The part of it that is compiled for each instruction set.
+struct Blocks<'c, 'a, 'o> {
+    job: &'c mut PoseChunk<'a, 'o>,
+    /// R of each Gaussian, for the SH; empty if they stay.
+    turns: &'c mut [Quaternion<f32>],
+}
+
+impl pulp::WithSimd for Blocks<'_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(mut self, _: S) {
-        for block in &self.chunk.blocks {
-            self.block(block);
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        for block in &self.job.chunk.blocks {
+            self.job.block(block, self.turns);
         }
     }
 }
 
 impl PoseChunk<'_, '_> {
+    /// Blocks are visited by joints; what streams through memory, SH and mesh, follows in the order of the Gaussians.
+    fn run(mut self) {
+        let frame = self.frame;
+        let rotates_sh = !self.outputs.sh.is_empty();
+        let mut turns = vec![[0.0; 4]; if rotates_sh { self.outputs.means.len() } else { 0 }];
+        frame.arch.dispatch(Blocks { job: &mut self, turns: &mut turns });
+        self.means_on_mesh();
+        let (degree, count) = (frame.bound.sh_degree, frame.bound.sh_count());
+        let input = frame.bound.sh[self.start * count..].chunks_exact(count);
+        for ((turn, input), output) in turns.iter().zip(input).zip(self.outputs.sh.chunks_exact_mut(count)) {
+            colour::rotate_sh(*turn, degree, input, output);
+        }
+    }
+
     #[inline(always)]
-    fn block(&mut self, block: &Block) {
-        let Frame { bound, strategy, joints, source, .. } = self.frame;
+    fn block(&mut self, block: &Block, turns: &mut [Quaternion<f32>]) {
+        let Frame { bound, strategy, joints, source, arch, .. } = self.frame;
         let (indices, weights) = self.chunk.influences(block);
         let blend = Blend::new(joints, indices, weights);
-        let canonical = Canonical::new(strategy.covariance, block, self.start, bound.surface.as_ref());
-        let input = BlockInput {
-            joints,
-            chunk: self.chunk,
-            block,
-            start: self.start,
-            blend: &blend,
-            canonical: &canonical.rotations,
+        let input = BlockInput { joints, chunk: self.chunk, block, start: self.start, blend: &blend };
+        let turn = turn(*arch, source, &input);
+        let mut scales = block.scales;
+        if strategy.rotation == RotationChoice::FaceFrame(FaceFrame::HahaScaled) {
+            self.scale_with_faces(block, &mut scales);
+        }
+        let factors = factors(strategy.covariance, &turn.posed, &blend, &block.rotations, &scales);
+        let means = match (bound.moves, &turn.means) {
+            (Moves::Not, _) | (Moves::WithFaces, _) => block.means,
+            (Moves::ByWeights, Some(means)) => *means,
+            (Moves::ByWeights, None) => blend.transform(&block.means),
         };
-        let turn = turn(self.arch, source, &input);
-        let (means, scales) = self.place(&input, canonical.scales);
-        let factors = factors(strategy.covariance, &turn.posed, &blend, &canonical.rotations, &scales);
-        self.store(block, &means, &factors, &turn, &blend);
-    }
-
-    /// Posed means, and the scales, which HAHA multiplies.
-    #[inline(always)]
-    fn place(&self, input: &BlockInput<'_>, mut scales: [Lanes; 3]) -> ([Lanes; 3], [Lanes; 3]) {
-        let Frame { bound, strategy, source, .. } = self.frame;
-        let mut means = match (bound.moves, source) {
-            (Moves::Not, _) => input.block.means,
-            (Moves::ByWeights, Source::Dual) => dual_means(input),
-            (Moves::ByWeights, _) => input.blend.transform(&input.block.means),
-            (Moves::WithFaces, _) => [[0.0; LANES]; 3],
-        };
-        let scaled = strategy.rotation == RotationChoice::FaceFrame(FaceFrame::HahaScaled);
-        let surface = match &bound.surface {
-            Some(surface) if bound.moves == Moves::WithFaces || scaled => surface,
-            _ => return (means, scales),
-        };
-        self.place_on_mesh(input, surface, &mut means, &mut scales);
-        (means, scales)
-    }
-
-    /// Means that follow the mesh.
-    #[inline(never)]
-    fn place_on_mesh(
-        &self,
-        input: &BlockInput<'_>,
-        surface: &Surface,
-        means: &mut [Lanes; 3],
-        scales: &mut [Lanes; 3],
-    ) {
-        let Frame { bound, body, strategy, source, .. } = self.frame;
-        let scaled = strategy.rotation == RotationChoice::FaceFrame(FaceFrame::HahaScaled);
-        let mesh = body.mesh();
-        for lane in 0..LANES {
-            let gaussian = self.start + usize::from(input.block.index[lane]);
-            let seat = &surface.seats[gaussian];
-            let mut mean = if bound.moves == Moves::WithFaces {
-                surface.point(seat, &mesh.vertices, &mesh.normals)
-            } else {
-                Vec3::new(means[0][lane], means[1][lane], means[2][lane])
-            };
-            if let (true, Source::Faces(turns)) = (scaled, source)
-                && let Some([w, x, y, z]) = turns.of_gaussian(gaussian)
-            {
-                let face = seat.face as usize;
-                let corners = surface.faces.corners[face].map(|v| mesh.vertices[v as usize]);
-                let ratio = face_frame::haha_size(&corners) / surface.faces.sizes[face];
-                let offset = bound.means[gaussian] - surface.faces.centroids[face];
-                let turned = glam::Quat::from_xyzw(x, y, z, w) * offset;
-                mean = face_frame::centroid(&corners) + turned * ratio;
-                scales.iter_mut().for_each(|axis| axis[lane] *= ratio);
-            }
-            for axis in 0..3 {
-                means[axis][lane] = mean[axis];
+        self.store(block, &means, &factors, &turn, turns);
+        if !self.outputs.view_frames.is_empty() {
+            for lane in 0..block.count {
+                let frame = colour::view_frame(strategy.colour, &turn.relative, &input, lane);
+                self.outputs.view_frames[usize::from(block.index[lane])] = frame;
             }
         }
     }
 
     #[inline(always)]
-    fn store(&mut self, block: &Block, means: &[Lanes; 3], factors: &[Lanes; 9], turn: &Turn, blend: &Blend) {
-        let Frame { bound, strategy, .. } = self.frame;
-        let sh_count = bound.sh_count();
+    fn store(
+        &mut self,
+        block: &Block,
+        means: &[Lanes; 3],
+        factors: &[Lanes; 9],
+        turn: &Turn,
+        turns: &mut [Quaternion<f32>],
+    ) {
         for lane in 0..block.count {
             let i = usize::from(block.index[lane]);
             self.outputs.means[i] = Vec3::new(means[0][lane], means[1][lane], means[2][lane]);
@@ -233,16 +257,43 @@ impl PoseChunk<'_, '_> {
             if let Some(rotation) = self.outputs.rotations.get_mut(i) {
                 *rotation = take(&turn.posed, lane);
             }
-            if let Some(frame) = self.outputs.view_frames.get_mut(i)
-                && let Some(view) = colour::view_frame(strategy.colour, &turn.relative, blend, lane)
-            {
-                *frame = view;
+            if let Some(relative) = turns.get_mut(i) {
+                *relative = take(&turn.relative, lane);
             }
-            if let Some(output) = self.outputs.sh.get_mut(i * sh_count..(i + 1) * sh_count) {
-                let first = (self.start + i) * sh_count;
-                let input = &bound.sh[first..first + sh_count];
-                colour::rotate_sh(&turn.relative, lane, bound.sh_degree, input, output);
+        }
+    }
+
+    /// Means that follow the mesh: those of face-bound Gaussians, and all under HAHA's scaled frames.
+    fn means_on_mesh(&mut self) {
+        let Frame { bound, body, strategy, source, .. } = self.frame;
+        let scaled = strategy.rotation == RotationChoice::FaceFrame(FaceFrame::HahaScaled);
+        let Some(surface) = &bound.surface else { return };
+        if bound.moves != Moves::WithFaces && !scaled {
+            return;
+        }
+        let mesh = body.mesh();
+        let seats = &surface.seats[self.start..];
+        if bound.moves == Moves::WithFaces {
+            for (mean, seat) in self.outputs.means.iter_mut().zip(seats) {
+                *mean = seat.point(&mesh.vertices, &mesh.normals);
             }
+        }
+        let (true, Source::Faces(turns)) = (scaled, source) else { return };
+        for (i, (mean, seat)) in self.outputs.means.iter_mut().zip(seats).enumerate() {
+            let gaussian = self.start + i;
+            let Some([w, x, y, z]) = turns.of_gaussian(gaussian) else { continue };
+            let corners = seat.corners.map(|v| mesh.vertices[v as usize]);
+            let offset = bound.means[gaussian] - surface.faces.centroids[seat.face as usize];
+            let turned = Quat::from_xyzw(x, y, z, w) * offset;
+            *mean = face_frame::centroid(&corners) + turned * self.frame.growth(gaussian);
+        }
+    }
+
+    #[inline(never)]
+    fn scale_with_faces(&self, block: &Block, scales: &mut [Lanes; 3]) {
+        for lane in 0..LANES {
+            let growth = self.frame.growth(self.start + usize::from(block.index[lane]));
+            scales.iter_mut().for_each(|axis| axis[lane] *= growth);
         }
     }
 }

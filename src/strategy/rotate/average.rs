@@ -7,6 +7,7 @@
 use super::super::blend::{self, Blend};
 use super::super::joints::Joints;
 use super::super::layout::{LANES, Lanes};
+use super::put;
 use crate::math::average::{Solver, average_rotation, lanes};
 use crate::math::{Quaternion, rotation};
 
@@ -165,12 +166,4 @@ pub(super) fn with_bones<R>(
 #[inline(always)]
 pub(super) fn splat(q: Quaternion<f32>) -> [Lanes; 4] {
     [[q[0]; LANES], [q[1]; LANES], [q[2]; LANES], [q[3]; LANES]]
-}
-
-/// Sets one lane.
-#[inline(always)]
-pub(super) fn put(quats: &mut [Lanes; 4], lane: usize, q: Quaternion<f32>) {
-    for k in 0..4 {
-        quats[k][lane] = q[k];
-    }
 }

@@ -2,8 +2,8 @@
 
 use super::super::joints::Joints;
 use super::super::layout::{LANES, Lanes};
-use super::average::{put, splat};
-use super::take;
+use super::average::splat;
+use super::{put, take};
 use crate::math::dual_quaternion::{self, DualQuaternion};
 use crate::math::rotation;
 
@@ -34,20 +34,33 @@ impl Motions {
 pub(super) fn blend(joints: &Joints, indices: &[u16], weights: &[Lanes]) -> Motions {
     const STACK: usize = 16;
     let identity = DualQuaternion::new(rotation::identity(), [0.0; 3]);
-    let mut blended = Motions { real: splat(identity.real), dual: splat(identity.dual) };
-    let (mut stack, mut heap) = ([identity; STACK], Vec::new());
-    let motions = indices.iter().map(|&joint| joints.motion[usize::from(joint)]);
-    let motions: &[_] = if indices.len() <= STACK {
-        stack.iter_mut().zip(motions).for_each(|(slot, motion)| *slot = motion);
-        &stack[..indices.len()]
-    } else {
-        heap.extend(motions);
-        &heap
-    };
-    let mut own = vec![0.0; indices.len()];
+    if indices.len() <= STACK {
+        let (mut motions, mut own) = ([identity; STACK], [0.0; STACK]);
+        return lane_by_lane(
+            joints,
+            indices,
+            weights,
+            &mut motions[..indices.len()],
+            &mut own[..indices.len()],
+        );
+    }
+    lane_by_lane(joints, indices, weights, &mut vec![identity; indices.len()], &mut vec![0.0; indices.len()])
+}
+
+fn lane_by_lane(
+    joints: &Joints,
+    indices: &[u16],
+    weights: &[Lanes],
+    motions: &mut [DualQuaternion<f32>],
+    own: &mut [f32],
+) -> Motions {
+    for (motion, &joint) in motions.iter_mut().zip(indices) {
+        *motion = joints.motion[usize::from(joint)];
+    }
+    let mut blended = Motions { real: splat(rotation::identity()), dual: splat([0.0; 4]) };
     for lane in 0..LANES {
         own.iter_mut().zip(weights).for_each(|(own, weight)| *own = weight[lane]);
-        if let Some(motion) = dual_quaternion::blend(motions, &own) {
+        if let Some(motion) = dual_quaternion::blend(motions, own) {
             put(&mut blended.real, lane, motion.real);
             put(&mut blended.dual, lane, motion.dual);
         }

@@ -4,12 +4,12 @@
 //! face without area in either pose, a vertex all of whose faces are, a sum of quaternions that cancels.
 
 use super::super::FaceFrame;
-use super::super::bound::Surface;
+use super::super::bound::{Seat, Surface};
 use super::super::face_frame;
 use super::super::joints::Joints;
 use super::super::layout::{LANES, Lanes};
-use super::BlockInput;
-use super::average::{put, splat, with_bones};
+use super::average::{splat, with_bones};
+use super::{BlockInput, put};
 use crate::math::average::{Solver, average_rotation};
 use crate::math::rotation::SignPolicy;
 use crate::math::{Quaternion, rotation};
@@ -20,17 +20,17 @@ use rayon::prelude::*;
 const CANCELLED: f32 = 1e-6;
 
 /// The rotation of every used face between the rest pose and a posed one.
-pub(in super::super) struct FaceTurns {
+pub(in super::super) struct FaceTurns<'a> {
     /// Per face; `None` for unused and degenerate ones.
     turns: Vec<Option<Quaternion<f32>>>,
-    faces: Vec<u32>,
+    seats: &'a [Seat],
 }
 
-impl FaceTurns {
+impl<'a> FaceTurns<'a> {
     /// Compares posed and rest frames.
-    pub(super) fn new(kind: FaceFrame, body: &PosedBody<'_>, surface: &Surface) -> Self {
+    pub(super) fn new(kind: FaceFrame, body: &PosedBody<'_>, surface: &'a Surface) -> Self {
         let turns = face_turns(kind, body, surface, |face| surface.face_used[face]);
-        Self { turns, faces: surface.seats.iter().map(|seat| seat.face).collect() }
+        Self { turns, seats: &surface.seats }
     }
 
     /// The turns of a block.
@@ -38,7 +38,7 @@ impl FaceTurns {
     pub(super) fn of_block(&self, input: &BlockInput<'_>) -> [Lanes; 4] {
         let mut turns = splat(rotation::identity());
         for lane in 0..LANES {
-            let turn = self.turns[self.faces[input.gaussian(lane)] as usize];
+            let turn = self.of_gaussian(input.gaussian(lane));
             put(&mut turns, lane, turn.unwrap_or_else(|| input.average_of(lane)));
         }
         turns
@@ -46,7 +46,7 @@ impl FaceTurns {
 
     /// The turn of a Gaussian's face.
     pub(in super::super) fn of_gaussian(&self, gaussian: usize) -> Option<Quaternion<f32>> {
-        self.turns[self.faces[gaussian] as usize]
+        self.turns[self.seats[gaussian].face as usize]
     }
 }
 
@@ -69,12 +69,11 @@ fn face_turns(
 }
 
 /// A rotation per used vertex, and how three of them become one.
-pub(in super::super) struct VertexTurns {
+pub(in super::super) struct VertexTurns<'a> {
     /// Per vertex; `None` for unused and degenerate ones.
     turns: Vec<Option<Quaternion<f32>>>,
     combine: Combine,
-    /// Corners and weights of each Gaussian.
-    places: Vec<([u32; 3], [f32; 3])>,
+    seats: &'a [Seat],
 }
 
 enum Combine {
@@ -84,9 +83,14 @@ enum Combine {
     Sum(SignPolicy),
 }
 
-impl VertexTurns {
+impl<'a> VertexTurns<'a> {
     /// Eq. 7 at every used vertex with its own skinning weights.
-    pub(super) fn averaged(solver: Solver, joints: &Joints, body: &PosedBody<'_>, surface: &Surface) -> Self {
+    pub(super) fn averaged(
+        solver: Solver,
+        joints: &Joints,
+        body: &PosedBody<'_>,
+        surface: &'a Surface,
+    ) -> Self {
         let turn = |vertex: usize| {
             let (indices, weights) = body.rest.weights.row(vertex);
             if !surface.vertex_used[vertex] {
@@ -100,12 +104,12 @@ impl VertexTurns {
             average.map(|q| q.map(|c| c as f32))
         };
         let turns = (0..surface.vertex_used.len()).into_par_iter().with_min_len(512).map(turn).collect();
-        Self { turns, combine: Combine::Average(solver), places: places(surface) }
+        Self { turns, combine: Combine::Average(solver), seats: &surface.seats }
     }
 
     /// SplattingAvatar: the sum of the rotations of all faces around a vertex, weighted by their area at rest, under a
     /// sign policy.
-    pub(super) fn summed(policy: SignPolicy, body: &PosedBody<'_>, surface: &Surface) -> Self {
+    pub(super) fn summed(policy: SignPolicy, body: &PosedBody<'_>, surface: &'a Surface) -> Self {
         let faces = &surface.faces;
         let used = |face: usize| faces.corners[face].iter().any(|&v| surface.vertex_used[v as usize]);
         let face_turns = face_turns(FaceFrame::SplattingAvatar, body, surface, used);
@@ -123,7 +127,7 @@ impl VertexTurns {
         let areas = &faces.areas;
         let largest = areas.iter().copied().fold(0.0f32, f32::max);
         let turns = sums.into_iter().map(|(sum, _)| unit(sum, CANCELLED * largest)).collect();
-        Self { turns, combine: Combine::Sum(policy), places: places(surface) }
+        Self { turns, combine: Combine::Sum(policy), seats: &surface.seats }
     }
 
     /// The turns of a block.
@@ -138,8 +142,9 @@ impl VertexTurns {
     }
 
     fn combined(&self, gaussian: usize) -> Option<Quaternion<f32>> {
-        let (corners, weights) = self.places[gaussian];
-        let [a, b, c] = corners.map(|vertex| self.turns[vertex as usize]);
+        let seat = &self.seats[gaussian];
+        let weights = seat.weights();
+        let [a, b, c] = seat.corners.map(|vertex| self.turns[vertex as usize]);
         let turns = [a?, b?, c?];
         match self.combine {
             Combine::Average(solver) => {
@@ -160,12 +165,6 @@ impl VertexTurns {
             }
         }
     }
-}
-
-fn places(surface: &Surface) -> Vec<([u32; 3], [f32; 3])> {
-    let place =
-        |seat: &super::super::bound::Seat| (surface.faces.corners[seat.face as usize], seat.weights());
-    surface.seats.iter().map(place).collect()
 }
 
 /// The quaternion of unit length, unless it is not longer than `floor`.

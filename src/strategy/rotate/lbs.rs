@@ -2,8 +2,8 @@
 
 use super::super::LbsProjection;
 use super::super::layout::{LANES, Lanes};
-use super::average::{put, splat};
-use super::{BlockInput, Turn, take};
+use super::average::splat;
+use super::{BlockInput, Turn, put, take};
 use crate::math::{Quaternion, matrix3, rotation};
 
 /// The projections that need B alone. A rigid joint alone is its own projection.
@@ -37,9 +37,10 @@ pub(super) fn projected(projection: LbsProjection, input: &BlockInput<'_>) -> [L
 /// PyTorch3D's quaternion of B R_c, raw or normalised: the posed quaternion itself.
 #[inline(never)]
 pub(super) fn converted(projection: LbsProjection, input: &BlockInput<'_>) -> Turn {
-    let mut turn = Turn { relative: splat(rotation::identity()), posed: splat(rotation::identity()) };
+    let identity = splat(rotation::identity());
+    let mut turn = Turn { relative: identity, posed: identity, means: None };
     for lane in 0..LANES {
-        let canonical = take(input.canonical, lane);
+        let canonical = take(&input.block.rotations, lane);
         let turned =
             matrix3::multiply(input.blend.matrix(lane), rotation::quaternion_to_matrix_raw(canonical));
         let raw = rotation::matrix_to_quaternion_raw(turned);

@@ -13,7 +13,7 @@ use super::layout::{Block, Chunk, LANES, Lanes};
 use super::{LbsProjection, RotationChoice};
 use crate::math::average::Solver;
 use crate::math::{Quaternion, rotation};
-use average::{put, splat};
+use average::splat;
 
 /// How the Gaussians of a block turn.
 pub(super) struct Turn {
@@ -21,10 +21,14 @@ pub(super) struct Turn {
     pub(super) relative: [Lanes; 4],
     /// The quaternions that are drawn: R ⊗ R_c, of unit length except for [`LbsProjection::MatrixToQuaternionRaw`].
     pub(super) posed: [Lanes; 4],
+    /// The posed means, where the rotation comes with a motion of its own.
+    pub(super) means: Option<[Lanes; 3]>,
 }
 
 /// What the rotation of a pose is read from, besides the blend.
-pub(super) enum Source {
+pub(super) enum Source<'a> {
+    /// Nothing: no Gaussian moves, or nobody asks how it turns.
+    Identity,
     /// The blended matrix.
     Lbs(LbsProjection),
     /// The joints' rotations.
@@ -32,31 +36,39 @@ pub(super) enum Source {
     /// The joints' rigid motions.
     Dual,
     /// One rotation per face.
-    Faces(FaceTurns),
+    Faces(FaceTurns<'a>),
     /// One rotation per vertex, combined over a face.
-    Vertices(VertexTurns),
+    Vertices(VertexTurns<'a>),
 }
 
-impl Source {
-    /// Everything that is computed once per pose. `None` where the choice reads faces and the avatar knows none.
+impl<'a> Source<'a> {
+    /// Everything that is computed once per pose. An avatar that knows no faces must be one that does not move.
     pub(super) fn new(
         choice: RotationChoice,
         joints: &Joints,
         body: &crate::scene::PosedBody<'_>,
-        surface: Option<&super::bound::Surface>,
-    ) -> Option<Self> {
-        Some(match choice {
-            RotationChoice::Lbs(projection) => Self::Lbs(projection),
-            RotationChoice::QuaternionAverage(solver) => Self::Average(solver),
-            RotationChoice::DualQuaternion => Self::Dual,
-            RotationChoice::FaceFrame(kind) => Self::Faces(FaceTurns::new(kind, body, surface?)),
-            RotationChoice::VertexAverage(solver) => {
-                Self::Vertices(VertexTurns::averaged(solver, joints, body, surface?))
+        surface: Option<&'a super::bound::Surface>,
+    ) -> Self {
+        match (choice, surface) {
+            (RotationChoice::Lbs(projection), _) => Self::Lbs(projection),
+            (RotationChoice::QuaternionAverage(solver), _) => Self::Average(solver),
+            (RotationChoice::DualQuaternion, _) => Self::Dual,
+            (RotationChoice::FaceFrame(kind), Some(surface)) => {
+                Self::Faces(FaceTurns::new(kind, body, surface))
             }
-            RotationChoice::VertexQuaternions(policy) => {
-                Self::Vertices(VertexTurns::summed(policy, body, surface?))
+            (RotationChoice::VertexAverage(solver), Some(surface)) => {
+                Self::Vertices(VertexTurns::averaged(solver, joints, body, surface))
             }
-        })
+            (RotationChoice::VertexQuaternions(policy), Some(surface)) => {
+                Self::Vertices(VertexTurns::summed(policy, body, surface))
+            }
+            (
+                RotationChoice::FaceFrame(_)
+                | RotationChoice::VertexAverage(_)
+                | RotationChoice::VertexQuaternions(_),
+                None,
+            ) => Self::Identity,
+        }
     }
 }
 
@@ -68,13 +80,11 @@ pub(super) struct BlockInput<'a> {
     /// Index of the chunk's first Gaussian.
     pub(super) start: usize,
     pub(super) blend: &'a Blend,
-    /// R_c as unit quaternions.
-    pub(super) canonical: &'a [Lanes; 4],
 }
 
 impl BlockInput<'_> {
     /// The quaternion average of one lane: what degenerate cases fall back on.
-    fn average_of(&self, lane: usize) -> Quaternion<f32> {
+    pub(super) fn average_of(&self, lane: usize) -> Quaternion<f32> {
         let (indices, weights) = self.chunk.influences(self.block);
         average::of_lane(self.joints, indices, weights, lane, Solver::ClosedForm)
     }
@@ -87,37 +97,33 @@ impl BlockInput<'_> {
 
 /// Turns a block.
 #[inline(always)]
-pub(super) fn turn(arch: pulp::Arch, source: &Source, input: &BlockInput<'_>) -> Turn {
+pub(super) fn turn(arch: pulp::Arch, source: &Source<'_>, input: &BlockInput<'_>) -> Turn {
     let (indices, weights) = input.chunk.influences(input.block);
     if indices.is_empty() {
-        return Turn { relative: splat(rotation::identity()), posed: *input.canonical };
+        return Turn { relative: splat(rotation::identity()), posed: input.block.rotations, means: None };
     }
+    let mut means = None;
     let relative = match source {
         Source::Lbs(
             projection @ (LbsProjection::MatrixToQuaternionRaw | LbsProjection::MatrixToQuaternion),
         ) => {
             return lbs::converted(*projection, input);
         }
+        Source::Identity => splat(rotation::identity()),
         Source::Lbs(projection) => lbs::projected(*projection, input),
         Source::Average(solver) => {
             average::average(arch, input.joints, indices, weights, input.blend, *solver)
         }
-        Source::Dual => dual::blend(input.joints, indices, weights).real,
+        Source::Dual => {
+            let motions = dual::blend(input.joints, indices, weights);
+            means = Some(motions.transform(&input.block.means));
+            motions.real
+        }
         Source::Faces(turns) => turns.of_block(input),
         Source::Vertices(turns) => turns.of_block(input),
     };
-    let posed = multiply(&relative, input.canonical);
-    Turn { relative, posed }
-}
-
-/// Moves the means of a block by dual-quaternion blending.
-#[inline(always)]
-pub(super) fn dual_means(input: &BlockInput<'_>) -> [Lanes; 3] {
-    let (indices, weights) = input.chunk.influences(input.block);
-    if indices.is_empty() {
-        return input.block.means;
-    }
-    dual::blend(input.joints, indices, weights).transform(&input.block.means)
+    let posed = multiply(&relative, &input.block.rotations);
+    Turn { relative, posed, means }
 }
 
 /// a ⊗ b per lane.
@@ -134,4 +140,12 @@ fn multiply(a: &[Lanes; 4], b: &[Lanes; 4]) -> [Lanes; 4] {
 #[inline(always)]
 pub(super) fn take(quats: &[Lanes; 4], lane: usize) -> Quaternion<f32> {
     [quats[0][lane], quats[1][lane], quats[2][lane], quats[3][lane]]
+}
+
+/// Sets one lane.
+#[inline(always)]
+pub(super) fn put(quats: &mut [Lanes; 4], lane: usize, q: Quaternion<f32>) {
+    for k in 0..4 {
+        quats[k][lane] = q[k];
+    }
 }
