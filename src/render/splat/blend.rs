@@ -2,8 +2,7 @@
 
 use super::lanes::Lanes;
 use super::preprocess::{Paint, Splat};
-use super::reach::BLOCK;
-use super::wide::Wide;
+use super::wide::{Wide, each};
 
 /// Alpha never exceeds this.
 const MAX_ALPHA: f32 = 0.99;
@@ -11,6 +10,10 @@ const MAX_ALPHA: f32 = 0.99;
 const LEAST_TRANSMITTANCE: f32 = 1e-4;
 /// x of a pixel that is done: no splat reaches it.
 const DONE: f32 = 1e30;
+
+/// Columns and rows of a block's pixels.
+const COLUMN: [f32; 16] = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
+const ROW: [f32; 16] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
 
 /// Sixteen pixels while they are blended, row by row.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +38,7 @@ impl Block {
     #[inline(always)]
     pub(super) fn new(left: usize) -> Self {
         Self {
-            x: std::array::from_fn(|i| (left + i % BLOCK) as f32),
+            x: each(COLUMN, |column| left as f32 + column),
             transmittance: [1.0; 16],
             colour: [[0.0; 16]; 3],
             depth: [0.0; 16],
@@ -64,9 +67,9 @@ impl Block {
     pub(super) fn blend<L: Lanes>(&mut self, l: L, top: usize, list: &[u16], splats: &[Splat]) {
         let n = |value: f32| Wide::splat(l, value);
         let mut x = Wide::load(l, &self.x);
-        let y = Wide::load(l, &std::array::from_fn(|i| (top + i / BLOCK) as f32));
+        let y = Wide::load(l, &ROW) + n(top as f32);
         let mut transmittance = Wide::load(l, &self.transmittance);
-        let [mut red, mut green, mut blue] = self.colour.map(|c| Wide::load(l, &c));
+        let [mut red, mut green, mut blue] = each(self.colour, |c| Wide::load(l, &c));
         let mut depth = Wide::load(l, &self.depth);
         for &i in list {
             let paint = &splats[usize::from(i)].paint;
@@ -101,7 +104,7 @@ impl Block {
 #[inline(always)]
 fn alpha<L: Lanes>(paint: &Paint, x: Wide<L>, y: Wide<L>) -> Wide<L> {
     let n = |value: f32| x.constant(value);
-    let [a, b, c] = paint.conic.map(n);
+    let [a, b, c] = each(paint.conic, n);
     let (dx, dy) = (x - n(paint.mean[0]), y - n(paint.mean[1]));
     let q = dx.mul_add(a.mul_add(dx, b * dy), c * dy * dy);
     let value = (n(paint.opacity) * q.exp2_negated()).min(n(MAX_ALPHA));

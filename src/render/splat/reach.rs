@@ -7,7 +7,7 @@ use super::bin::STRIP_TILES;
 use super::lanes::Lanes;
 use super::preprocess::Splat;
 use super::project::{SAFETY, TILE};
-use super::wide::Wide;
+use super::wide::{Wide, each};
 
 /// Side of a block, pixels.
 pub(super) const BLOCK: usize = 4;
@@ -28,7 +28,7 @@ const NEXT: usize = 256;
 pub(super) struct Segment {
     pub(super) splats: Vec<Splat>,
     bounds: Vec<Bounds>,
-    spans: Vec<u16>,
+    spans: Vec<[u16; 16]>,
     /// Of all blocks of the band, one after the other.
     lists: Vec<u16>,
     /// Where each block's list ends.
@@ -90,9 +90,8 @@ impl Segment {
         self.spans.clear();
         let top = (band * BLOCK) as f32;
         for bounds in &self.bounds {
-            self.spans.extend(spans(l, bounds, top).map(|span| span as u16));
+            self.spans.push(each(spans(l, bounds, top), |span| span as u16));
         }
-        self.spans.truncate(self.splats.len());
         self.fill_lists();
     }
 
@@ -108,7 +107,7 @@ impl Segment {
         // Differences of the counts, then starts; filling turns them into ends. An index of 8 bits cannot miss the array.
         let next = &mut self.next;
         *next = [0; NEXT];
-        for &span in &self.spans {
+        for &span in self.spans.as_flattened() {
             let [first, end] = span.to_le_bytes();
             next[usize::from(first)] = next[usize::from(first)].wrapping_add(1);
             next[usize::from(end)] = next[usize::from(end)].wrapping_sub(1);
@@ -123,7 +122,7 @@ impl Segment {
         if self.lists.len() < total {
             self.lists.resize(total, 0);
         }
-        for (i, &span) in self.spans.iter().enumerate() {
+        for (i, &span) in self.spans.as_flattened().iter().enumerate() {
             let [first, end] = span.to_le_bytes();
             // Most splats reach few blocks. Writing a fixed number of places, and moving on only in the lists that are
             // reached, has no branch to predict; a place past a list's end is its slack.
