@@ -25,12 +25,22 @@ pub(super) struct Block {
     depth: [f32; 16],
 }
 
-/// A finished pixel.
+/// A finished block.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pixel {
-    pub(super) colour: [f32; 3],
-    pub(super) alpha: f32,
-    pub(super) depth: f32,
+pub(super) struct Pixels {
+    pub(super) red: [f32; 16],
+    pub(super) green: [f32; 16],
+    pub(super) blue: [f32; 16],
+    pub(super) alpha: [f32; 16],
+    pub(super) depth: [f32; 16],
+}
+
+impl Pixels {
+    /// A block that no splat reaches.
+    #[inline(always)]
+    pub(super) fn of_background([red, green, blue]: [f32; 3]) -> Self {
+        Self { red: [red; 16], green: [green; 16], blue: [blue; 16], alpha: [0.0; 16], depth: [0.0; 16] }
+    }
 }
 
 impl Block {
@@ -45,20 +55,19 @@ impl Block {
         }
     }
 
-    /// True when no further splat can change it.
+    /// The block over the background.
     #[inline(always)]
-    pub(super) fn is_done(&self) -> bool {
-        self.x.iter().all(|&x| x == DONE)
-    }
-
-    /// One pixel over the background.
-    #[inline(always)]
-    pub(super) fn pixel(&self, i: usize, background: [f32; 3]) -> Pixel {
-        let t = self.transmittance[i];
-        Pixel {
-            colour: std::array::from_fn(|c| t.mul_add(background[c], self.colour[c][i])),
-            alpha: 1.0 - t,
-            depth: self.depth[i],
+    pub(super) fn pixels<L: Lanes>(&self, l: L, background: [f32; 3]) -> Pixels {
+        let transmittance = Wide::load(l, &self.transmittance);
+        let over = |c: usize| {
+            transmittance.mul_add(Wide::splat(l, background[c]), Wide::load(l, &self.colour[c])).store()
+        };
+        Pixels {
+            red: over(0),
+            green: over(1),
+            blue: over(2),
+            alpha: (Wide::splat(l, 1.0) - transmittance).store(),
+            depth: self.depth,
         }
     }
 
@@ -71,6 +80,9 @@ impl Block {
         let mut transmittance = Wide::load(l, &self.transmittance);
         let [mut red, mut green, mut blue] = each(self.colour, |c| Wide::load(l, &c));
         let mut depth = Wide::load(l, &self.depth);
+        if !x.less(n(DONE)).any() {
+            return;
+        }
         for &i in list {
             let paint = &splats[usize::from(i)].paint;
             let mut alpha = alpha(paint, x, y);
