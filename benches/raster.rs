@@ -27,7 +27,7 @@ fn main() {
             }
             let (camera, background) = splat_scene::camera(cam);
             let settings = RenderSettings { background, antialiased: false };
-            for threads in [1, 2] {
+            for threads in std::env::var("THREADS").map_or(vec![1, 2], |v| vec![v.parse().unwrap()]) {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| {
                     let mut r = Renderer::with_simd_level(level).unwrap();
@@ -38,14 +38,14 @@ fn main() {
                         r.render_into(&posed, &camera, &settings, &mut out);
                         best = best.min(t.elapsed().as_secs_f64());
                     }
-                    for _ in 0..reps / 4 {
+                    for _ in 0..if std::env::var("QUICK").is_ok() {0} else {reps / 4} {
                         let t = Instant::now();
                         let o = r.render(&posed, &camera, &settings);
                         fresh = fresh.min(t.elapsed().as_secs_f64());
                         drop(o);
                     }
                     let mut p = [f64::MAX; 5];
-                    for _ in 0..reps / 4 {
+                    for _ in 0..if std::env::var("QUICK").is_ok() {0} else {reps / 4} {
                         let t = r.render_profiled(&posed, &camera, &settings, &mut out);
                         for (i, ph) in [Phase::Preprocess, Phase::Sort, Phase::Bin, Phase::Blend, Phase::Write].into_iter().enumerate() {
                             p[i] = p[i].min(t.of(ph).as_secs_f64() * 1e3);

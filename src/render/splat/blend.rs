@@ -2,8 +2,7 @@
 
 use super::lanes::Lanes;
 use super::preprocess::{Paint, Splat};
-use super::reach::BLOCK;
-use super::wide::Wide;
+use super::wide::{Wide, each};
 
 /// Alpha never exceeds this.
 const MAX_ALPHA: f32 = 0.99;
@@ -11,6 +10,10 @@ const MAX_ALPHA: f32 = 0.99;
 const LEAST_TRANSMITTANCE: f32 = 1e-4;
 /// x of a pixel that is done: no splat reaches it.
 const DONE: f32 = 1e30;
+
+/// Columns and rows of a block's pixels.
+const COLUMN: [f32; 16] = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
+const ROW: [f32; 16] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
 
 /// Sixteen pixels while they are blended, row by row.
 #[derive(Clone, Copy, Debug)]
@@ -22,12 +25,22 @@ pub(super) struct Block {
     depth: [f32; 16],
 }
 
-/// A finished pixel.
+/// A finished block.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pixel {
-    pub(super) colour: [f32; 3],
-    pub(super) alpha: f32,
-    pub(super) depth: f32,
+pub(super) struct Pixels {
+    pub(super) red: [f32; 16],
+    pub(super) green: [f32; 16],
+    pub(super) blue: [f32; 16],
+    pub(super) alpha: [f32; 16],
+    pub(super) depth: [f32; 16],
+}
+
+impl Pixels {
+    /// A block that no splat reaches.
+    #[inline(always)]
+    pub(super) fn of_background([red, green, blue]: [f32; 3]) -> Self {
+        Self { red: [red; 16], green: [green; 16], blue: [blue; 16], alpha: [0.0; 16], depth: [0.0; 16] }
+    }
 }
 
 impl Block {
@@ -35,27 +48,26 @@ impl Block {
     #[inline(always)]
     pub(super) fn new(left: usize) -> Self {
         Self {
-            x: std::array::from_fn(|i| (left + i % BLOCK) as f32),
+            x: each(COLUMN, |column| left as f32 + column),
             transmittance: [1.0; 16],
             colour: [[0.0; 16]; 3],
             depth: [0.0; 16],
         }
     }
 
-    /// True when no further splat can change it.
+    /// The block over the background.
     #[inline(always)]
-    pub(super) fn is_done(&self) -> bool {
-        self.x.iter().all(|&x| x == DONE)
-    }
-
-    /// One pixel over the background.
-    #[inline(always)]
-    pub(super) fn pixel(&self, i: usize, background: [f32; 3]) -> Pixel {
-        let t = self.transmittance[i];
-        Pixel {
-            colour: std::array::from_fn(|c| t.mul_add(background[c], self.colour[c][i])),
-            alpha: 1.0 - t,
-            depth: self.depth[i],
+    pub(super) fn pixels<L: Lanes>(&self, l: L, background: [f32; 3]) -> Pixels {
+        let transmittance = Wide::load(l, &self.transmittance);
+        let over = |c: usize| {
+            transmittance.mul_add(Wide::splat(l, background[c]), Wide::load(l, &self.colour[c])).store()
+        };
+        Pixels {
+            red: over(0),
+            green: over(1),
+            blue: over(2),
+            alpha: (Wide::splat(l, 1.0) - transmittance).store(),
+            depth: self.depth,
         }
     }
 
@@ -64,10 +76,13 @@ impl Block {
     pub(super) fn blend<L: Lanes>(&mut self, l: L, top: usize, list: &[u16], splats: &[Splat]) {
         let n = |value: f32| Wide::splat(l, value);
         let mut x = Wide::load(l, &self.x);
-        let y = Wide::load(l, &std::array::from_fn(|i| (top + i / BLOCK) as f32));
+        let y = Wide::load(l, &ROW) + n(top as f32);
         let mut transmittance = Wide::load(l, &self.transmittance);
-        let [mut red, mut green, mut blue] = self.colour.map(|c| Wide::load(l, &c));
+        let [mut red, mut green, mut blue] = each(self.colour, |c| Wide::load(l, &c));
         let mut depth = Wide::load(l, &self.depth);
+        if !x.less(n(DONE)).any() {
+            return;
+        }
         for &i in list {
             let paint = &splats[usize::from(i)].paint;
             let mut alpha = alpha(paint, x, y);
@@ -101,7 +116,7 @@ impl Block {
 #[inline(always)]
 fn alpha<L: Lanes>(paint: &Paint, x: Wide<L>, y: Wide<L>) -> Wide<L> {
     let n = |value: f32| x.constant(value);
-    let [a, b, c] = paint.conic.map(n);
+    let [a, b, c] = each(paint.conic, n);
     let (dx, dy) = (x - n(paint.mean[0]), y - n(paint.mean[1]));
     let q = dx.mul_add(a.mul_add(dx, b * dy), c * dy * dy);
     let value = (n(paint.opacity) * q.exp2_negated()).min(n(MAX_ALPHA));

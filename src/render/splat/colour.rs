@@ -1,7 +1,7 @@
 //! View-dependent colour: real spherical harmonics to degree 3 in the 3DGS basis and order.
 
 use super::lanes::Lanes;
-use super::wide::Wide;
+use super::wide::{Wide, each};
 use crate::scene::ColourClamp;
 
 const C0: f32 = 0.282_094_791_773_878_14;
@@ -59,14 +59,14 @@ pub(super) fn direction<L: Lanes>(
     frame: Option<[[Wide<L>; 3]; 3]>,
 ) -> [Wide<L>; 3] {
     let n = |value: f32| mean[0].constant(value);
-    let d = [0, 1, 2].map(|i| mean[i] - n(camera[i]));
+    let d = each([0, 1, 2], |i| mean[i] - n(camera[i]));
     let turned = match frame {
-        Some(f) => [0, 1, 2].map(|i| f[2][i].mul_add(d[2], f[1][i].mul_add(d[1], f[0][i] * d[0]))),
+        Some(f) => each([0, 1, 2], |i| f[2][i].mul_add(d[2], f[1][i].mul_add(d[1], f[0][i] * d[0]))),
         None => d,
     };
     let square = turned[2].mul_add(turned[2], turned[1].mul_add(turned[1], turned[0] * turned[0]));
     let scale = n(0.0).less(square).keep(n(1.0) / square.sqrt());
-    turned.map(|v| v * scale)
+    each(turned, |v| v * scale)
 }
 
 /// `Σ b_k c_k + 1/2`, before clamping. `coefficients` are RGB triples, as many as the degree has; `basis(k)` is b_k.
@@ -94,7 +94,7 @@ pub(super) fn evaluate(coefficients: &[[f32; 3]], basis: impl Fn(usize) -> f32) 
 #[inline(always)]
 pub(super) fn clamped(colour: [f32; 3], clamp: ColourClamp) -> [f32; 3] {
     match clamp {
-        ColourClamp::NonNegative => colour.map(|c| c.max(0.0)),
-        ColourClamp::Unit => colour.map(|c| c.max(0.0).min(1.0)),
+        ColourClamp::NonNegative => each(colour, |c| c.max(0.0)),
+        ColourClamp::Unit => each(colour, |c| c.max(0.0).min(1.0)),
     }
 }

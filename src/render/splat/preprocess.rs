@@ -4,7 +4,7 @@ use super::bin::{Bins, Grid};
 use super::colour;
 use super::lanes::{Kernel, Lanes};
 use super::project::{Ellipse, HALF_LOG2_E, Projected, View, project};
-use super::wide::Wide;
+use super::wide::{Wide, each};
 use crate::scene::Posed;
 
 const LANES: usize = 16;
@@ -71,8 +71,8 @@ impl Kernel for Preprocess<'_> {
             let count = LANES.min(splats.len() - start);
             let base = first + start;
             let group = Group::load(posed, base, count);
-            let projected = group.project(l, view).map(|row| row.store());
-            let basis = group.basis(l, view).map(Wide::store);
+            let projected = group.project(l, view).map(Wide::store);
+            let basis = each(group.basis(l, view), Wide::store);
             for lane in 0..count {
                 if projected.visible[lane] == 0.0 {
                     continue;
@@ -83,7 +83,7 @@ impl Kernel for Preprocess<'_> {
                     continue;
                 }
                 let p = projected.map(|row| row[lane]);
-                let tiles = p.tiles.map(|t| t as u16);
+                let tiles = each(p.tiles, |t| t as u16);
                 let colour = colour::clamped(colour, posed.colour_clamp);
                 splats[written] = Splat {
                     paint: Paint::new(&p, colour),
@@ -125,15 +125,15 @@ impl Group {
     #[inline(always)]
     fn project<L: Lanes>(&self, l: L, view: &View) -> Projected<Wide<L>> {
         let load = |row: [f32; LANES]| Wide::load(l, &row);
-        let factors = self.factors.map(|column| column.map(load));
-        project(view, self.means.map(load), factors, load(self.opacities))
+        let factors = each(self.factors, |column| each(column, load));
+        project(view, each(self.means, load), factors, load(self.opacities))
     }
 
     #[inline(always)]
     fn basis<L: Lanes>(&self, l: L, view: &View) -> [Wide<L>; 16] {
         let load = |row: [f32; LANES]| Wide::load(l, &row);
-        let frames = self.frames.map(|frames| frames.map(|column| column.map(load)));
-        colour::basis(colour::direction(self.means.map(load), view.position, frames))
+        let frames = self.frames.map(|frames| each(frames, |column| each(column, load)));
+        colour::basis(colour::direction(each(self.means, load), view.position, frames))
     }
 }
 

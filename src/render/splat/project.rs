@@ -4,7 +4,7 @@
 //! Sixteen Gaussians at a time, without branches.
 
 use super::lanes::Lanes;
-use super::wide::Wide;
+use super::wide::{Wide, each};
 use crate::scene::Camera;
 use glam::DMat4;
 
@@ -110,24 +110,24 @@ pub(super) struct Ellipse<T> {
     pub(super) rightmost: T,
 }
 
-impl<T> Projected<T> {
+impl<T: Copy> Projected<T> {
     #[inline(always)]
-    pub(super) fn map<U>(&self, mut f: impl FnMut(&T) -> U) -> Projected<U> {
+    pub(super) fn map<U: Copy>(&self, f: impl Fn(T) -> U) -> Projected<U> {
         Projected {
-            visible: f(&self.visible),
-            mean: self.mean.each_ref().map(&mut f),
-            depth: f(&self.depth),
-            covariance: self.covariance.each_ref().map(&mut f),
-            conic: self.conic.each_ref().map(&mut f),
-            opacity: f(&self.opacity),
-            radius: f(&self.radius),
-            reach: f(&self.reach),
-            tiles: self.tiles.each_ref().map(&mut f),
+            visible: f(self.visible),
+            mean: each(self.mean, &f),
+            depth: f(self.depth),
+            covariance: each(self.covariance, &f),
+            conic: each(self.conic, &f),
+            opacity: f(self.opacity),
+            radius: f(self.radius),
+            reach: f(self.reach),
+            tiles: each(self.tiles, &f),
             ellipse: Ellipse {
-                slope: f(&self.ellipse.slope),
-                bend: f(&self.ellipse.bend),
-                half_width_squared: f(&self.ellipse.half_width_squared),
-                rightmost: f(&self.ellipse.rightmost),
+                slope: f(self.ellipse.slope),
+                bend: f(self.ellipse.bend),
+                half_width_squared: f(self.ellipse.half_width_squared),
+                rightmost: f(self.ellipse.rightmost),
             },
         }
     }
@@ -144,7 +144,7 @@ pub(super) fn project<L: Lanes>(
     let number = |value: f32| opacity.constant(value);
     let z = affine(view.rows[2], mean);
     let inverse_z = number(1.0) / z;
-    let axes = [0, 1].map(|k| screen_axis(view, k, mean, factor, inverse_z));
+    let axes = [screen_axis(view, 0, mean, factor, inverse_z), screen_axis(view, 1, mean, factor, inverse_z)];
     let (bare_xx, xy, bare_yy) = (dot(axes[0], axes[0]), dot(axes[0], axes[1]), dot(axes[1], axes[1]));
     let (xx, yy) = (bare_xx + number(LOW_PASS), bare_yy + number(LOW_PASS));
     let determinant = xx * yy - xy * xy;
@@ -154,7 +154,7 @@ pub(super) fn project<L: Lanes>(
     let middle = number(0.5) * (xx + yy);
     let largest = middle + (middle * middle - determinant).max(number(0.1)).sqrt();
     let radius = (number(3.0) * largest.sqrt()).ceil();
-    let mean = [0, 1].map(|k| pixel_position(view, k, mean, z));
+    let mean = [pixel_position(view, 0, mean, z), pixel_position(view, 1, mean, z)];
 
     let ratio = ((bare_xx * bare_yy - xy * xy) * inverse).max(number(LEAST_COMPENSATION));
     let opacity = if view.antialiased { opacity * ratio.sqrt() } else { opacity };
@@ -177,7 +177,10 @@ pub(super) fn project<L: Lanes>(
 
     // One infinity or NaN among these makes their sum so.
     let parts = [mean[0], mean[1], z, xx, yy, radius, square, determinant, inverse, half_width_squared];
-    let sum = parts.into_iter().fold(number(0.0), |sum, part| sum + part.abs());
+    let mut sum = number(0.0);
+    for part in parts {
+        sum = sum + part.abs();
+    }
     let drawable =
         (number(NEAR).less(z)).and(number(0.0).less(determinant)).and(sum.less(number(f32::INFINITY)));
     let reaches = (x0.less(x1)).and(y0.less(y1)).and(number(LEAST_OPACITY).less(opacity));
@@ -208,8 +211,9 @@ fn screen_axis<L: Lanes>(
     let limit = number(view.limit[k]);
     let slope = (affine(view.rows[k], mean) * inverse_z).max(-limit).min(limit);
     let scale = number(view.focal[k]) * inverse_z;
-    let row = [0, 1, 2].map(|i| slope.neg_mul_add(number(view.rows[2][i]), number(view.rows[k][i])) * scale);
-    factor.map(|column| dot(row, column))
+    let row =
+        each([0, 1, 2], |i| slope.neg_mul_add(number(view.rows[2][i]), number(view.rows[k][i])) * scale);
+    [dot(row, factor[0]), dot(row, factor[1]), dot(row, factor[2])]
 }
 
 /// Pixel coordinate k. The original computes `((ndc + 1) size - 1) / 2` in f64 and rounds: the same bits as one fused

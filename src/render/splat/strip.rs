@@ -1,7 +1,7 @@
 //! Second phase: one strip of the image, from the chunks' lists to finished pixels.
 
 use super::bin::{Bins, Entry, STRIP_TILES, STRIP_WIDTH, sort_by_depth, splat_of};
-use super::blend::Block;
+use super::blend::{Block, Pixels};
 use super::lanes::{Kernel, Lanes};
 use super::preprocess::Splat;
 use super::profile::{Clock, Phase};
@@ -22,7 +22,9 @@ pub(super) struct Scratch {
     entries: Vec<Entry>,
     spare: Vec<Entry>,
     segment: Segment,
-    blocks: Vec<Block>,
+    /// Of the strip, band by band; `None` where no splat reached yet.
+    blocks: Vec<Option<Block>>,
+    background: Vec<[f32; 3]>,
     pub(super) clock: Clock,
 }
 
@@ -54,7 +56,7 @@ impl Kernel for DrawStrip<'_, '_> {
         sort_by_depth(&mut self.scratch.entries, &mut self.scratch.spare);
         self.scratch.clock.lap(Phase::Sort);
         self.blend(l);
-        self.write();
+        self.write(l);
         self.scratch.clock.lap(Phase::Write);
     }
 }
@@ -72,20 +74,18 @@ impl DrawStrip<'_, '_> {
         let Scratch { entries, segment, blocks, clock, .. } = &mut *self.scratch;
         let left = self.column * STRIP_WIDTH;
         let top = self.row * TILE;
-        let columns = self.rows.colour[0].len().div_ceil(BLOCK);
         blocks.clear();
-        for _ in 0..TILE / BLOCK {
-            blocks.extend((0..COLUMNS).map(|column| Block::new(left + column * BLOCK)));
-        }
+        blocks.resize(COLUMNS * TILE / BLOCK, None);
         for run in entries.chunks(SEGMENT) {
             segment.load(run.iter().map(|&e| self.splats[splat_of(e)]), self.column * STRIP_TILES, top);
             clock.lap(Phase::Bin);
             for (band, blocks) in blocks.chunks_mut(COLUMNS).enumerate() {
                 segment.list_band(l, band);
                 clock.lap(Phase::Bin);
-                for (column, block) in blocks[..columns].iter_mut().enumerate() {
+                for (column, block) in blocks.iter_mut().enumerate() {
                     let list = segment.list(column);
-                    if !list.is_empty() && !block.is_done() {
+                    if !list.is_empty() {
+                        let block = block.get_or_insert_with(|| Block::new(left + column * BLOCK));
                         block.blend(l, top + band * BLOCK, list, &segment.splats);
                     }
                 }
@@ -95,22 +95,58 @@ impl DrawStrip<'_, '_> {
     }
 
     fn fill_background(&mut self) {
-        self.rows.colour.iter_mut().for_each(|row| row.fill(self.background));
+        let row = &mut self.scratch.background;
+        row.clear();
+        row.resize(STRIP_WIDTH, self.background);
+        self.rows.colour.iter_mut().for_each(|colour| colour.copy_from_slice(&row[..colour.len()]));
         self.rows.alpha.iter_mut().for_each(|row| row.fill(0.0));
         self.rows.depth.iter_mut().for_each(|row| row.fill(0.0));
     }
 
     #[inline(always)]
-    fn write(&mut self) {
-        let blocks = &self.scratch.blocks;
-        for y in 0..TILE {
-            let (band, within) = (y / BLOCK, y % BLOCK);
-            let outputs =
-                self.rows.colour[y].iter_mut().zip(&mut *self.rows.alpha[y]).zip(&mut *self.rows.depth[y]);
-            for (x, ((colour, alpha), depth)) in outputs.enumerate() {
-                let block = &blocks[band * COLUMNS + x / BLOCK];
-                let pixel = block.pixel(within * BLOCK + x % BLOCK, self.background);
-                (*colour, *alpha, *depth) = (pixel.colour, pixel.alpha, pixel.depth);
+    fn write<L: Lanes>(&mut self, l: L) {
+        let columns = self.rows.colour[0].len().div_ceil(BLOCK);
+        for (band, blocks) in self.scratch.blocks.chunks(COLUMNS).enumerate() {
+            for (column, block) in blocks[..columns].iter().enumerate() {
+                let pixels = match block {
+                    Some(block) => block.pixels(l, self.background),
+                    None => Pixels::of_background(self.background),
+                };
+                pixels.write(&mut self.rows, column * BLOCK, band * BLOCK);
+            }
+        }
+    }
+}
+
+impl Pixels {
+    /// Writes the part of a block that lies within the image.
+    #[inline(always)]
+    fn write(&self, rows: &mut Rows, left: usize, top: usize) {
+        for row in 0..BLOCK {
+            let at = |i: usize| row * BLOCK + i;
+            let (Some(colour), Some(alpha), Some(depth)) = (
+                rows.colour[top + row].get_mut(left..),
+                rows.alpha[top + row].get_mut(left..),
+                rows.depth[top + row].get_mut(left..),
+            ) else {
+                return; // below the image
+            };
+            if let (Some(colour), Some(alpha), Some(depth)) = (
+                colour.first_chunk_mut::<BLOCK>(),
+                alpha.first_chunk_mut::<BLOCK>(),
+                depth.first_chunk_mut::<BLOCK>(),
+            ) {
+                for i in 0..BLOCK {
+                    colour[i] = [self.red[at(i)], self.green[at(i)], self.blue[at(i)]];
+                    alpha[i] = self.alpha[at(i)];
+                    depth[i] = self.depth[at(i)];
+                }
+            } else {
+                for i in 0..colour.len() {
+                    colour[i] = [self.red[at(i)], self.green[at(i)], self.blue[at(i)]];
+                    alpha[i] = self.alpha[at(i)];
+                    depth[i] = self.depth[at(i)];
+                }
             }
         }
     }

@@ -132,6 +132,16 @@ impl<L: Lanes> Wide<L> {
     }
 }
 
+/// `values.map(f)`. (`map` is not always inlined, and then loses the vector instructions of its caller.)
+#[inline(always)]
+pub(super) fn each<const N: usize, T: Copy, U: Copy>(values: [T; N], mut f: impl FnMut(T) -> U) -> [U; N] {
+    let mut out = [f(values[0]); N];
+    for i in 1..N {
+        out[i] = f(values[i]);
+    }
+    out
+}
+
 /// Sixteen truth values.
 #[derive(Clone, Copy)]
 pub(super) struct Mask<L: Lanes> {
