@@ -46,8 +46,7 @@ impl Render {
             bail!("{}: --out; expected a name that ends in .png or .npy", self.out.display());
         }
         let background = self.background.or(view.background).unwrap_or([0.0; 3]);
-        let settings =
-            RenderSettings { background, antialiased: self.antialiased, ..RenderSettings::default() };
+        let settings = RenderSettings { background, antialiased: self.antialiased };
         let subject = self.posing.load(&self.file)?;
         let rendered = subject
             .posed(self.posing.strategy(), |posed| Ok(splat::render(posed, &view.camera, &settings)))?;

@@ -174,8 +174,7 @@ fn run_variant(
             let start = Instant::now();
             let posed = strategy::pose(bound, &frame.body, &strategy)?;
             seconds.pose = start.elapsed().as_secs_f64();
-            let settings =
-                RenderSettings { background, antialiased: job.antialiased, ..RenderSettings::default() };
+            let settings = RenderSettings { background, antialiased: job.antialiased };
             let start = Instant::now();
             let rendered = renderer.render(&posed, frame.camera, &settings);
             seconds.render = start.elapsed().as_secs_f64();

@@ -21,7 +21,7 @@ pub use skin_weights::SkinWeights;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{field}: {problem}; expected {expected}")]
 pub struct SceneError {
-    /// Which field is wrong, with an index where there is one ("weights[17]").
+    /// Which field is wrong, with an index where there is one ("weights\[17\]").
     pub field: String,
     /// What is wrong with it.
     pub problem: String,
