@@ -56,7 +56,7 @@ pub(super) fn rows_of(
             dataset.subjects.iter().filter(|s| s.capture == stand_in.capture && chosen(options, &s.id))
         {
             for mut row in stand_in_rows(stand_in, dataset, subject, options) {
-                if several {
+                if several && dataset.id != subject.id {
                     row.label = format!("{}: {}", dataset.id, row.label);
                 }
                 rows.push(row);
