@@ -97,9 +97,9 @@ fn read_obj(path: &Path) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), Error> {
         let mut words = line.split_ascii_whitespace();
         match words.next() {
             Some("v") => {
-                let values: Vec<f64> =
-                    words.take(3).filter_map(|w| w.parse().ok()).filter(|v: &f64| v.is_finite()).collect();
-                let vertex = <[f64; 3]>::try_from(values).map_err(|_| bad("v X Y Z with finite numbers"))?;
+                let numbers = words.take(3).filter_map(|w| w.parse().ok()).filter(|v: &f64| v.is_finite());
+                let vertex = <[f64; 3]>::try_from(numbers.collect::<Vec<f64>>()).ok();
+                let vertex = vertex.ok_or_else(|| bad("v X Y Z with finite numbers"))?;
                 vertices.push(DVec3::from_array(vertex));
             }
             Some("f") => {

@@ -3,6 +3,7 @@
 use super::super::{Error, error};
 use crate::scene::SceneError;
 use ::gltf::accessor::{DataType, Dimensions, Item, Iter};
+use ::gltf::json::validation::Checked;
 use ::gltf::{Accessor, Document, Gltf, buffer, image};
 use base64::Engine;
 use glam::Mat4;
@@ -191,6 +192,23 @@ fn check_root(root: &::gltf::json::Root) -> Result<(), SceneError> {
                 let field = format!("meshes[{m}].primitives[{p}].attributes");
                 let expected = format!("an index below {} (accessors)", root.accessors.len());
                 return Err(SceneError::new(field, format!("accessor {}", index.value()), expected));
+            }
+        }
+    }
+    for (a, animation) in root.animations.iter().enumerate() {
+        for (c, channel) in animation.channels.iter().enumerate() {
+            let field = format!("animations[{a}].channels[{c}].target");
+            let node = channel.target.node.value();
+            if node >= root.nodes.len() {
+                let expected = format!("an index below {} (nodes)", root.nodes.len());
+                return Err(SceneError::new(field, format!("node {node}"), expected));
+            }
+            if channel.target.path == Checked::Invalid {
+                return Err(SceneError::new(
+                    field,
+                    "unknown path",
+                    "translation, rotation, scale or weights",
+                ));
             }
         }
     }
