@@ -7,6 +7,7 @@
 //! | module | formats |
 //! |---|---|
 //! | [`ply`] | 3DGS avatars, with their binding in extra properties |
+//! | [`splatting_avatar`] | avatars that SplattingAvatar exports |
 //! | [`body`], [`gltf`] | SMPL-style `.npz`, skinned glTF 2.0 |
 //! | [`poses`] | SMPL-style `.npz` and JSON, glTF clips |
 //! | [`camera`] | camera JSON, `transforms.json`, `cameras.npz` |
@@ -35,6 +36,7 @@ pub mod poses;
 mod reduce;
 pub mod registry;
 pub mod sequence;
+pub mod splatting_avatar;
 pub mod synthetic;
 
 pub use error::Error;

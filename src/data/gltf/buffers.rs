@@ -3,6 +3,7 @@
 use super::super::{Error, error};
 use crate::scene::SceneError;
 use ::gltf::accessor::{DataType, Dimensions, Item, Iter};
+use ::gltf::json::validation::Checked;
 use ::gltf::{Accessor, Document, Gltf, buffer, image};
 use base64::Engine;
 use glam::Mat4;
@@ -19,8 +20,11 @@ impl Source {
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let expected = "a glTF 2.0 document";
         let bytes = error::read_bytes(path, "glTF", expected)?;
-        let Gltf { document, blob } = Gltf::from_slice(&bytes)
-            .map_err(|cause| Error::invalid(path, "glTF", cause.to_string(), expected))?;
+        let invalid = |cause: ::gltf::Error| Error::invalid(path, "glTF", one_line(&cause), expected);
+        let Gltf { document, blob } = Gltf::from_slice_without_validation(&bytes).map_err(invalid)?;
+        let root = document.into_json();
+        check_root(&root).map_err(|e| Error::scene(path, e))?;
+        let document = Document::from_json(root).map_err(invalid)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let mut source = Self { document, buffers: Vec::new(), folder };
         source.buffers = source.load_buffers(blob).map_err(|e| Error::scene(path, e))?;
@@ -65,10 +69,16 @@ impl Source {
 
     /// The encoded bytes of an image.
     pub(super) fn image_bytes(&self, image: &image::Image) -> Result<Vec<u8>, SceneError> {
+        // Not through `image.source()`, which panics on a view without a MIME type.
         let field = format!("images[{}]", image.index());
-        match image.source() {
-            image::Source::View { view, .. } => self.view(&view, &field).map(<[u8]>::to_vec),
-            image::Source::Uri { uri, .. } => self.resolve(uri, &field),
+        let json = &self.document.as_json().images[image.index()];
+        match (&json.buffer_view, &json.uri) {
+            (Some(index), _) => match self.document.views().nth(index.value()) {
+                Some(view) => self.view(&view, &field).map(<[u8]>::to_vec),
+                None => Err(SceneError::new(field, "no such buffer view", "a buffer view or a URI")),
+            },
+            (None, Some(uri)) => self.resolve(uri, &field),
+            (None, None) => Err(SceneError::new(field, "no source", "a buffer view or a URI")),
         }
     }
 
@@ -168,5 +178,49 @@ impl Source {
             let problem = format!("bufferViews[{}] ends outside its buffer", view.index());
             SceneError::new(field, problem, "a view inside its buffer")
         })
+    }
+}
+
+/// What the crate's own validation takes for granted.
+fn check_root(root: &::gltf::json::Root) -> Result<(), SceneError> {
+    if !root.asset.version.starts_with("2.") {
+        return Err(SceneError::new("asset.version", &root.asset.version, "2.x"));
+    }
+    for (m, mesh) in root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            if let Some(index) = primitive.attributes.values().find(|i| i.value() >= root.accessors.len()) {
+                let field = format!("meshes[{m}].primitives[{p}].attributes");
+                let expected = format!("an index below {} (accessors)", root.accessors.len());
+                return Err(SceneError::new(field, format!("accessor {}", index.value()), expected));
+            }
+        }
+    }
+    for (a, animation) in root.animations.iter().enumerate() {
+        for (c, channel) in animation.channels.iter().enumerate() {
+            let field = format!("animations[{a}].channels[{c}].target");
+            let node = channel.target.node.value();
+            if node >= root.nodes.len() {
+                let expected = format!("an index below {} (nodes)", root.nodes.len());
+                return Err(SceneError::new(field, format!("node {node}"), expected));
+            }
+            if channel.target.path == Checked::Invalid {
+                return Err(SceneError::new(
+                    field,
+                    "unknown path",
+                    "translation, rotation, scale or weights",
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A validation error lists every fault; the first one is enough.
+fn one_line(error: &::gltf::Error) -> String {
+    match error {
+        ::gltf::Error::Validation(faults) if !faults.is_empty() => {
+            format!("{}: {}", faults[0].0, faults[0].1)
+        }
+        other => other.to_string(),
     }
 }

@@ -66,24 +66,24 @@ fn gaussians(rows: &mut Rows) -> Result<Gaussians, SceneError> {
         return Err(SceneError::new("f_rest", problem, "0, 9, 24 or 45 (SH degree 0 to 3)"));
     };
     let per_channel = rest.len() / 3;
+    let mut g = Gaussians { sh_degree, ..Gaussians::default() };
     let n = rows.len();
-    let vec3 = |columns: &[Column; 3], i: usize| Vec3::from_array(columns.map(|c| rows.value(i, c)));
-    let mut sh = Vec::with_capacity(n * (per_channel + 1));
+    g.means.reserve_exact(n);
+    g.rotations.reserve_exact(n);
+    g.log_scales.reserve_exact(n);
+    g.opacity_logits.reserve_exact(n);
+    g.sh.reserve_exact(n * (per_channel + 1));
+    // One pass over the rows: they are longer than a cache line.
     for i in 0..n {
-        sh.push(dc.map(|c| rows.value(i, c)));
-        sh.extend(
-            (0..per_channel)
-                .map(|k| std::array::from_fn(|channel| rows.value(i, rest[channel * per_channel + k]))),
-        );
+        g.means.push(Vec3::from_array(position.map(|c| rows.value(i, c))));
+        g.rotations.push(rotation.map(|c| rows.value(i, c)));
+        g.log_scales.push(Vec3::from_array(scale.map(|c| rows.value(i, c))));
+        g.opacity_logits.push(rows.value(i, opacity));
+        g.sh.push(dc.map(|c| rows.value(i, c)));
+        let coefficient = |k: usize| [0, 1, 2].map(|channel| rows.value(i, rest[channel * per_channel + k]));
+        g.sh.extend((0..per_channel).map(coefficient));
     }
-    Ok(Gaussians {
-        means: (0..n).map(|i| vec3(&position, i)).collect(),
-        rotations: (0..n).map(|i| rotation.map(|c| rows.value(i, c))).collect(),
-        log_scales: (0..n).map(|i| vec3(&scale, i)).collect(),
-        opacity_logits: (0..n).map(|i| rows.value(i, opacity)).collect(),
-        sh_degree,
-        sh,
-    })
+    Ok(g)
 }
 
 fn binding(rows: &mut Rows) -> Result<Binding, SceneError> {
@@ -94,14 +94,14 @@ fn binding(rows: &mut Rows) -> Result<Binding, SceneError> {
             let problem = format!("{} properties", weights.len());
             return Err(SceneError::new("weight_*", problem, format!("{}, as joint_*", joints.len())));
         }
-        let n = rows.len();
-        let mut table = Vec::with_capacity(n);
-        for i in 0..n {
-            let row = joints.iter().zip(&weights);
-            let row = row.map(|(&j, &w)| Ok((rows.index(i, j, "joint")?, rows.value(i, w))));
-            table.push(row.collect::<Result<Vec<_>, SceneError>>()?);
+        for i in 0..rows.len() {
+            joints.iter().try_for_each(|&j| rows.index(i, j, "joint").map(drop))?;
         }
-        return SkinWeights::from_rows(table, usize::from(u16::MAX) + 1).map(Binding::Vertex);
+        let rows = &*rows;
+        let pairs = joints.iter().zip(&weights);
+        let row = |i| pairs.clone().map(move |(&j, &w)| (rows.number(i, j) as usize, rows.value(i, w)));
+        let table = SkinWeights::from_rows((0..rows.len()).map(row), usize::from(u16::MAX) + 1)?;
+        return Ok(Binding::Vertex(table));
     }
     if !rows.has("face") {
         return Ok(Binding::Static);
@@ -130,6 +130,7 @@ struct Column {
 struct Rows<'a> {
     bytes: Cow<'a, [u8]>,
     element: &'a Element,
+    stride: usize,
     big_endian: bool,
     used: Vec<bool>,
 }
@@ -154,7 +155,13 @@ impl<'a> Rows<'a> {
             _ => Cow::Borrowed(fixed_rows(element, body)?),
         };
         let used = vec![false; element.properties.len()];
-        Ok(Self { bytes, element, big_endian: header.encoding == Encoding::BigEndian, used })
+        Ok(Self {
+            bytes,
+            element,
+            stride: element.stride(),
+            big_endian: header.encoding == Encoding::BigEndian,
+            used,
+        })
     }
 
     fn len(&self) -> usize {
@@ -202,7 +209,10 @@ impl<'a> Rows<'a> {
     }
 
     fn value(&self, row: usize, column: Column) -> f32 {
-        self.number(row, column) as f32
+        match column.kind {
+            Kind::F32 => f32::from_le_bytes(self.ordered(&self.bytes[row * self.stride + column.offset..])),
+            _ => self.number(row, column) as f32,
+        }
     }
 
     fn index(&self, row: usize, column: Column, name: &str) -> Result<usize, SceneError> {
@@ -214,8 +224,7 @@ impl<'a> Rows<'a> {
     }
 
     fn number(&self, row: usize, column: Column) -> f64 {
-        let start = row * self.element.stride() + column.offset;
-        let bytes = &self.bytes[start..start + column.kind.size()];
+        let bytes = &self.bytes[row * self.stride + column.offset..];
         match column.kind {
             Kind::I8 => f64::from(bytes[0] as i8),
             Kind::U8 => f64::from(bytes[0]),
@@ -229,7 +238,8 @@ impl<'a> Rows<'a> {
     }
 
     fn ordered<const N: usize>(&self, bytes: &[u8]) -> [u8; N] {
-        let mut array: [u8; N] = std::array::from_fn(|i| bytes[i]);
+        let mut array = [0; N];
+        array.copy_from_slice(&bytes[..N]);
         if self.big_endian {
             array.reverse();
         }

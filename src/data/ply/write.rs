@@ -35,10 +35,11 @@ pub fn write_avatar(
     }
     atomic::write(path, |w| {
         w.write_all(header(avatar, metadata, encoding).as_bytes())?;
+        let influences = influences(avatar);
         let mut row = Vec::new();
         for i in 0..avatar.gaussians.len() {
             row.clear();
-            fill_row(&mut row, avatar, i);
+            fill_row(&mut row, avatar, influences, i);
             match encoding {
                 Encoding::Ascii => write_line(w, &row)?,
                 _ => row.iter().try_for_each(|value| w.write_all(&value.to_le_bytes()))?,
@@ -91,9 +92,9 @@ fn header(avatar: &Avatar, metadata: &Metadata, encoding: Encoding) -> String {
     numbered("rot", 4).iter().for_each(|name| property("float", name));
     let binding = match &avatar.binding {
         Binding::Static => "none",
-        Binding::Vertex(weights) => {
-            numbered("joint", weights.max_influences()).iter().for_each(|name| property("uint", name));
-            numbered("weight", weights.max_influences()).iter().for_each(|name| property("float", name));
+        Binding::Vertex(_) => {
+            numbered("joint", influences(avatar)).iter().for_each(|name| property("uint", name));
+            numbered("weight", influences(avatar)).iter().for_each(|name| property("float", name));
             "vertex"
         }
         Binding::Face(_) => {
@@ -112,7 +113,15 @@ fn header(avatar: &Avatar, metadata: &Metadata, encoding: Encoding) -> String {
     lines.join("\n")
 }
 
-fn fill_row(row: &mut Vec<Value>, avatar: &Avatar, i: usize) {
+/// Joints per row of a vertex binding.
+fn influences(avatar: &Avatar) -> usize {
+    match &avatar.binding {
+        Binding::Vertex(weights) => weights.max_influences(),
+        _ => 0,
+    }
+}
+
+fn fill_row(row: &mut Vec<Value>, avatar: &Avatar, influences: usize, i: usize) {
     let g = &avatar.gaussians;
     let sh = &g.sh[i * g.sh_count()..(i + 1) * g.sh_count()];
     let floats = |row: &mut Vec<Value>, values: &[f32]| row.extend(values.iter().map(|&v| Value::Float(v)));
@@ -129,8 +138,7 @@ fn fill_row(row: &mut Vec<Value>, avatar: &Avatar, i: usize) {
         Binding::Static => {}
         Binding::Vertex(weights) => {
             let (joints, values) = weights.row(i);
-            let width = weights.max_influences();
-            let padding = width - joints.len();
+            let padding = influences - joints.len();
             row.extend(joints.iter().map(|&j| Value::Index(u32::from(j))));
             row.extend(std::iter::repeat_n(Value::Index(0), padding));
             floats(row, values);
