@@ -39,7 +39,7 @@ fn face_neighbours(faces: &[[u32; 3]]) -> Vec<Vec<usize>> {
 
 /// Axis 2 a + s: axis a, positive for s = 0.
 fn axis_vector(axis: usize) -> DVec3 {
-    let sign = if axis % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = if axis.is_multiple_of(2) { 1.0 } else { -1.0 };
     DVec3::AXES[axis / 2] * sign
 }
 
@@ -52,7 +52,8 @@ fn smoothed_labels(normals: &[DVec3], parts: &[usize], neighbours: &[Vec<usize>]
     let mut labels: Vec<(usize, usize)> = normals.iter().zip(parts).map(|(n, &p)| (p, nearest(n))).collect();
     for _ in 0..6 {
         let better = |i: usize| {
-            let around = |label: (usize, usize)| neighbours[i].iter().filter(|&&n| labels[n] == label).count();
+            let around =
+                |label: (usize, usize)| neighbours[i].iter().filter(|&&n| labels[n] == label).count();
             let allowed = |label: &(usize, usize)| {
                 label.0 == parts[i] && normals[i].dot(axis_vector(label.1)) > 0.35 && around(*label) >= 2
             };

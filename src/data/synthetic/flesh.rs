@@ -10,7 +10,9 @@ pub(super) fn flesh(proportions: Proportions) -> Field {
     let pen = Pen { place: Placement(proportions), girth: proportions.girth, mirror: 1.0 };
     let thin = Pen { girth: 1.0, ..pen };
     let (right, thin_right) = (Pen { mirror: -1.0, ..pen }, Pen { mirror: -1.0, ..thin });
-    let part = |capsules, blend: f64, join: f64| Part::new(capsules, blend * pen.place.scale(), join * pen.place.scale());
+    let part = |capsules, blend: f64, join: f64| {
+        Part::new(capsules, blend * pen.place.scale(), join * pen.place.scale())
+    };
     let parts = vec![
         part(torso(pen), 0.035, 0.05),
         part(head(thin), 0.016, 0.03),
@@ -29,7 +31,11 @@ pub(super) fn flesh(proportions: Proportions) -> Field {
 /// Where the mesh is finer.
 pub(super) fn lenses(proportions: Proportions) -> Vec<Lens> {
     let place = Placement(proportions);
-    let hand = |mirror: f64| Lens { centre: place.point([mirror * 0.79, ARM_Y, ARM_Z + 0.01]), radius: 0.075, power: 3.6 };
+    let hand = |mirror: f64| Lens {
+        centre: place.point([mirror * 0.79, ARM_Y, ARM_Z + 0.01]),
+        radius: 0.075,
+        power: 3.6,
+    };
     let head = Lens { centre: place.point([0.0, 1.62, 0.06]), radius: 0.09, power: 2.0 };
     vec![head, hand(1.0), hand(-1.0)]
 }
@@ -88,8 +94,8 @@ fn head(pen: Pen) -> Vec<Capsule> {
     let mut head = vec![
         pen.flat([0.0, 1.642, -0.012], 0.098, [0.0, 1.640, 0.022], 0.092, [0.86, 1.0, 1.0]), // cranium
         pen.flat([0.0, 1.610, 0.030], 0.078, [0.0, 1.556, 0.052], 0.050, [0.90, 1.0, 1.0]),  // jaw
-        pen.bone([-0.008, 1.538, 0.080], 0.020, [0.008, 1.538, 0.080], 0.020),                    // chin
-        pen.bone([0.0, 1.640, 0.108], 0.008, [0.0, 1.600, 0.123], 0.0125),                  // nose
+        pen.bone([-0.008, 1.538, 0.080], 0.020, [0.008, 1.538, 0.080], 0.020),               // chin
+        pen.bone([0.0, 1.640, 0.108], 0.008, [0.0, 1.600, 0.123], 0.0125),                   // nose
         pen.bone([-0.014, 1.567, 0.098], 0.009, [0.014, 1.567, 0.098], 0.009),               // lips
         pen.bone([0.0, 1.50, -0.016], 0.050, [0.0, 1.57, 0.0], 0.048),                       // nape
     ];
@@ -153,10 +159,10 @@ fn leg(pen: Pen) -> Vec<Capsule> {
 fn foot(pen: Pen) -> Vec<Capsule> {
     let flat = [1.0, 0.72, 1.0];
     vec![
-        pen.bone([0.104, 0.10, -0.030], 0.036, [0.104, 0.05, -0.050], 0.037),                   // heel
-        pen.bone([0.104, 0.075, -0.020], 0.038, [0.110, 0.042, 0.070], 0.032),                  // instep
-        pen.flat([0.102, 0.032, -0.045], 0.036, [0.108, 0.026, 0.095], 0.036, flat),            // inner sole
-        pen.flat([0.112, 0.030, -0.030], 0.034, [0.132, 0.026, 0.080], 0.034, flat),            // outer sole
-        pen.flat([0.106, 0.026, 0.095], 0.034, [0.112, 0.024, 0.130], 0.030, flat),             // toes
+        pen.bone([0.104, 0.10, -0.030], 0.036, [0.104, 0.05, -0.050], 0.037), // heel
+        pen.bone([0.104, 0.075, -0.020], 0.038, [0.110, 0.042, 0.070], 0.032), // instep
+        pen.flat([0.102, 0.032, -0.045], 0.036, [0.108, 0.026, 0.095], 0.036, flat), // inner sole
+        pen.flat([0.112, 0.030, -0.030], 0.034, [0.132, 0.026, 0.080], 0.034, flat), // outer sole
+        pen.flat([0.106, 0.026, 0.095], 0.034, [0.112, 0.024, 0.130], 0.030, flat), // toes
     ]
 }

@@ -38,7 +38,8 @@ const WRAP: f32 = 0.15;
 /// Radiance of the surrounding from a direction: bright above, dark below, a soft window to the front left.
 fn surrounding(direction: Vec3, roughness: f32) -> Vec3 {
     let height = (direction.y * 0.5 + 0.5).clamp(0.0, 1.0);
-    let sky = Vec3::new(0.12, 0.11, 0.10).lerp(Vec3::new(0.58, 0.62, 0.68), height * height * (3.0 - 2.0 * height));
+    let sky =
+        Vec3::new(0.12, 0.11, 0.10).lerp(Vec3::new(0.58, 0.62, 0.68), height * height * (3.0 - 2.0 * height));
     let window = direction.dot(Vec3::new(-0.549_442, 0.457_869, 0.699_290));
     let edge = 0.08 + roughness * 0.6;
     let glow = ((window - 0.80 + edge) / (2.0 * edge)).clamp(0.0, 1.0);
@@ -88,7 +89,8 @@ pub(super) fn to_srgb(radiance: Vec3) -> [f32; 3] {
     radiance.to_array().map(|c| {
         // The identity up to the knee, then an exponential approach to 1 with the same slope.
         const KNEE: f32 = 0.7;
-        let rolled = if c <= KNEE { c.max(0.0) } else { 1.0 - (1.0 - KNEE) * (-(c - KNEE) / (1.0 - KNEE)).exp() };
+        let rolled =
+            if c <= KNEE { c.max(0.0) } else { 1.0 - (1.0 - KNEE) * (-(c - KNEE) / (1.0 - KNEE)).exp() };
         if rolled <= 0.003_130_8 { 12.92 * rolled } else { 1.055 * rolled.powf(1.0 / 2.4) - 0.055 }
     })
 }
@@ -96,4 +98,37 @@ pub(super) fn to_srgb(radiance: Vec3) -> [f32; 3] {
 /// sRGB value to linear.
 pub(super) fn to_linear(srgb: [f32; 3]) -> Vec3 {
     Vec3::from_array(srgb.map(|c| if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_of_lights_are_unit_vectors() {
+        LIGHTS.iter().for_each(|light| assert!((light.direction.length() - 1.0).abs() < 1e-5));
+    }
+
+    #[test]
+    fn without_reflectance_the_view_does_not_matter_and_with_it_it_does() {
+        let normal = Vec3::new(0.3, 0.4, 0.9).normalize();
+        let views = [normal, Vec3::Z, Vec3::new(0.8, 0.1, 0.6).normalize()];
+        let seen = |reflectance| {
+            let finish = Finish { albedo: Vec3::new(0.5, 0.3, 0.2), roughness: 0.3, reflectance };
+            views.map(|view| shade(finish, normal, view, 1.0))
+        };
+        let [a, b, c] = seen(0.0);
+        assert!(a == b && b == c);
+        let [a, b, c] = seen(0.045);
+        assert!((a - b).length() > 0.01 && (b - c).length() > 0.01);
+    }
+
+    #[test]
+    fn srgb_is_monotone_bounded_and_exact_below_the_knee() {
+        let values: Vec<f32> = (0..2000).map(|i| to_srgb(Vec3::splat(i as f32 * 0.005))[0]).collect();
+        assert!(values.windows(2).all(|w| w[1] >= w[0]) && values.iter().all(|v| (0.0..=1.0).contains(v)));
+        for c in [0.0, 0.01, 0.2, 0.8] {
+            assert!((to_srgb(to_linear([c; 3]))[0] - c).abs() < 1e-6);
+        }
+    }
 }

@@ -30,7 +30,11 @@ impl Material {
         Self {
             look,
             seed,
-            shirt: [to_linear(hsv(hue, 0.72, 0.80)), to_linear(WHITE), to_linear(hsv(hue + 35.0, 0.85, 0.35))],
+            shirt: [
+                to_linear(hsv(hue, 0.72, 0.80)),
+                to_linear(WHITE),
+                to_linear(hsv(hue + 35.0, 0.85, 0.35)),
+            ],
             trousers: [to_linear(hsv(trousers, 0.55, 0.42)), to_linear(hsv(trousers, 0.30, 0.72))],
             skin: between([0.36, 0.22, 0.16], [0.94, 0.76, 0.66], look.skin),
             hair: between([0.07, 0.05, 0.05], [0.80, 0.62, 0.38], look.hair),
@@ -143,7 +147,8 @@ impl Material {
     }
 
     fn torso(&self, p: Vec3) -> Finish {
-        let arc = 0.14 * p.x.atan2(p.z + 0.01);
+        // Along the surface from the middle to the flanks: across in front and behind, backwards at the sides.
+        let arc = p.x.abs() - 0.7 * p.z;
         let mut colour = self.pattern(Vec2::new(p.y, arc) * self.rate(), self.shirt);
         if p.z > 0.0 {
             colour = self.emblem(Vec2::new(p.x, p.y - 1.27) / 0.075, colour);
@@ -169,7 +174,11 @@ impl Material {
     /// Chevrons on the back, which tell up from down and left from right.
     fn arrow(&self, at: Vec2, cloth: Vec3) -> Vec3 {
         let chevron = at.y + at.x.abs() * 0.8;
-        if at.x.abs() < 0.9 && at.y.abs() < 1.0 && (chevron * 2.2).rem_euclid(1.0) < 0.42 && chevron.abs() < 0.9 {
+        if at.x.abs() < 0.9
+            && at.y.abs() < 1.0
+            && (chevron * 2.2).rem_euclid(1.0) < 0.42
+            && chevron.abs() < 0.9
+        {
             let ink = if at.x > 0.0 { self.shirt[2] } else { to_linear(DARK) };
             return self.contrasted(ink, cloth);
         }
@@ -178,7 +187,7 @@ impl Material {
 
     fn sleeve(&self, p: Vec3) -> Finish {
         let out = p.x.abs();
-        if out < 0.160 || out > 0.640 {
+        if !(0.160..=0.640).contains(&out) {
             return self.cloth(self.shirt[2], p, 0.62);
         }
         let around = (p.y - ARM_Y as f32).atan2(p.z - ARM_Z as f32) / TAU;
@@ -207,7 +216,13 @@ impl Material {
         let colour = match () {
             () if (around - 0.25).abs() < 0.022 => to_linear(WHITE),
             () if (around - 0.25).abs() < 0.045 => self.shirt[0],
-            () if knee => if fine.rem_euclid(2.0) < 0.5 { light } else { base * 0.5 },
+            () if knee => {
+                if fine.rem_euclid(2.0) < 0.5 {
+                    light
+                } else {
+                    base * 0.5
+                }
+            }
             () if (around * 26.0).rem_euclid(1.0) < 0.14 && p.y < 0.86 => light,
             () if (p.y - 0.14).abs() < 0.006 => light,
             () => base,
@@ -253,8 +268,13 @@ impl Material {
 
     /// Eyes, brows, lips and warm cheeks.
     fn face(&self, p: Vec3, skin: Finish) -> Finish {
-        let ellipse = |x: f32, y: f32, rx: f32, ry: f32| Vec2::new((p.x.abs() - x) / rx, (p.y - y) / ry).length();
-        let painted = |colour: Vec3, roughness| Finish { albedo: self.contrasted(colour, skin.albedo), roughness, ..skin };
+        let ellipse =
+            |x: f32, y: f32, rx: f32, ry: f32| Vec2::new((p.x.abs() - x) / rx, (p.y - y) / ry).length();
+        let painted = |colour: Vec3, roughness| Finish {
+            albedo: self.contrasted(colour, skin.albedo),
+            roughness,
+            ..skin
+        };
         let eye = ellipse(0.033, 1.634, 0.0125, 0.0062);
         if eye < 1.0 {
             return match ellipse(0.033, 1.634, 1.0, 1.0) {

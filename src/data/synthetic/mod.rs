@@ -53,7 +53,11 @@ pub fn subjects(text: &str) -> Result<BTreeMap<String, Parameters>, SceneError> 
     let tables = toml::Deserializer::parse(text).and_then(BTreeMap::<String, Parameters>::deserialize);
     let tables = tables.map_err(|cause| {
         let problem = cause.to_string();
-        SceneError::new("subjects", problem.trim_end().replace('\n', " "), "a table of parameters per subject")
+        SceneError::new(
+            "subjects",
+            problem.trim_end().replace('\n', " "),
+            "a table of parameters per subject",
+        )
     })?;
     for (name, parameters) in &tables {
         parameters.validate().map_err(|e| SceneError { field: format!("{name}.{}", e.field), ..e })?;

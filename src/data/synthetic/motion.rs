@@ -109,10 +109,18 @@ impl Actor<'_> {
         let sway = |cycles, shift: f64| life * wave(cycles, t, phase + shift);
         self.rotate("pelvis", [0.0, 360.0 * motion.turns * t, 0.0]);
         self.lower_arms(A_POSE + 8.0 * sway(3.0, 0.0), A_POSE + 8.0 * sway(3.0, 0.25));
-        self.mirrored("elbow", [0.0, -14.0 - 12.0 * sway(2.0, 0.1), 0.0], [0.0, -14.0 - 12.0 * sway(2.0, 0.6), 0.0]);
+        self.mirrored(
+            "elbow",
+            [0.0, -14.0 - 12.0 * sway(2.0, 0.1), 0.0],
+            [0.0, -14.0 - 12.0 * sway(2.0, 0.6), 0.0],
+        );
         self.mirrored("wrist", [18.0 * sway(2.0, 0.0), 0.0, 0.0], [18.0 * sway(2.0, 0.3), 0.0, 0.0]);
         self.both("hip", [0.0, 4.0, 5.0]);
-        self.mirrored("hip", [-8.0 * sway(3.0, 0.0).max(-0.2), 0.0, 0.0], [-8.0 * sway(3.0, 0.5).max(-0.2), 0.0, 0.0]);
+        self.mirrored(
+            "hip",
+            [-8.0 * sway(3.0, 0.0).max(-0.2), 0.0, 0.0],
+            [-8.0 * sway(3.0, 0.5).max(-0.2), 0.0, 0.0],
+        );
         self.mirrored("knee", [6.0 + 6.0 * sway(3.0, 0.0), 0.0, 0.0], [6.0 + 6.0 * sway(3.0, 0.5), 0.0, 0.0]);
         self.rotate("spine2", [0.0, 7.0 * sway(2.0, 0.0), 3.0 * sway(1.0, 0.2)]);
         self.rotate("head", [4.0 * sway(2.0, 0.4), 10.0 * sway(2.0, 0.1), 0.0]);
@@ -124,8 +132,16 @@ impl Actor<'_> {
         self.rotate("pelvis", [0.0, 360.0 * motion.turns * t, 0.0]);
         self.lower_arms(35.0 + 32.0 * sway(2.0, 0.0), 35.0 + 32.0 * sway(2.0, 0.4));
         self.mirrored("shoulder", [0.0, -18.0 * sway(2.0, 0.2), 0.0], [0.0, -18.0 * sway(2.0, 0.7), 0.0]);
-        self.mirrored("elbow", [0.0, -38.0 - 36.0 * sway(3.0, 0.0), 0.0], [0.0, -38.0 - 36.0 * sway(3.0, 0.35), 0.0]);
-        self.mirrored("wrist", [30.0 * sway(2.0, 0.3), 0.0, 12.0 * sway(3.0, 0.0)], [30.0 * sway(2.0, 0.8), 0.0, 0.0]);
+        self.mirrored(
+            "elbow",
+            [0.0, -38.0 - 36.0 * sway(3.0, 0.0), 0.0],
+            [0.0, -38.0 - 36.0 * sway(3.0, 0.35), 0.0],
+        );
+        self.mirrored(
+            "wrist",
+            [30.0 * sway(2.0, 0.3), 0.0, 12.0 * sway(3.0, 0.0)],
+            [30.0 * sway(2.0, 0.8), 0.0, 0.0],
+        );
         for (side, shift) in [("left", 0.0), ("right", 0.5)] {
             let lift = (life * wave(3.0, t, shift)).max(0.0).powi(2);
             self.rotate(&format!("{side}_hip"), [-10.0 - 42.0 * lift, 0.0, 0.0]);
@@ -143,7 +159,12 @@ impl Actor<'_> {
         let life = motion.liveliness;
         let sway = |cycles, shift: f64| life * wave(cycles, t, phase + shift);
         self.rotate("pelvis", [0.0, 75.0 * motion.turns * wave(1.0, t, 0.0), 0.0]);
-        self.arms_before_chest(14.0 * sway(2.0, 0.0), 14.0 * sway(2.0, 0.45), 45.0 * sway(2.0, 0.1), 45.0 * sway(2.0, 0.6));
+        self.arms_before_chest(
+            14.0 * sway(2.0, 0.0),
+            14.0 * sway(2.0, 0.45),
+            45.0 * sway(2.0, 0.1),
+            45.0 * sway(2.0, 0.6),
+        );
         for (i, finger) in FINGERS.into_iter().enumerate() {
             let curl = |shift: f64| 28.0 + 26.0 * sway(3.0, 0.12 * i as f64 + shift);
             self.curl(finger, curl(0.0), curl(0.5));
@@ -166,7 +187,11 @@ impl Actor<'_> {
             self.rotate(joint, [0.0, -twist / 5.0 * wave(1.0, t, 0.12), 0.0]);
         }
         self.both("hip", [0.0, 10.0, 6.0]);
-        self.mirrored("hip", [0.0, 0.12 * twist * wave(1.0, t, 0.4), 0.0], [0.0, -0.12 * twist * wave(1.0, t, 0.4), 0.0]);
+        self.mirrored(
+            "hip",
+            [0.0, 0.12 * twist * wave(1.0, t, 0.4), 0.0],
+            [0.0, -0.12 * twist * wave(1.0, t, 0.4), 0.0],
+        );
         self.rotate("pelvis", [0.0, 35.0 * wave(1.0, t, 0.62), 0.0]);
     }
 

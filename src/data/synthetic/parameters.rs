@@ -195,7 +195,7 @@ impl Default for Parameters {
 
 impl Default for FigureShape {
     fn default() -> Self {
-        Self { height: 1.74, girth: 1.0, shoulders: 1.0, softness: 1.0, edge: 0.02 }
+        Self { height: 1.74, girth: 1.0, shoulders: 1.0, softness: 1.0, edge: 0.023 }
     }
 }
 
@@ -257,7 +257,7 @@ impl Parameters {
                 ("rig.girth", girth, 0.85, 1.25),
                 ("rig.shoulders", shoulders, 0.9, 1.2),
                 ("rig.softness", softness, 0.3, 1.5),
-                ("rig.edge", edge, 0.01, 0.025),
+                ("rig.edge", edge, 0.01, 0.03),
             ]),
             Rig::Arm(ArmShape { bones, length, radius, softness, edge }) => check(&[
                 ("rig.bones", f64::from(bones), 1.0, 32.0),
@@ -279,7 +279,9 @@ impl Parameters {
             ("test_cameras", f64::from(self.test_cameras), 1.0, 64.0),
         ])?;
         if self.capture != Capture::Multiview {
-            for (field, cameras) in [("train_cameras", self.train_cameras), ("test_cameras", self.test_cameras)] {
+            for (field, cameras) in
+                [("train_cameras", self.train_cameras), ("test_cameras", self.test_cameras)]
+            {
                 if cameras != 1 {
                     let problem = format!("{cameras} cameras");
                     return Err(SceneError::new(field, problem, "1 unless capture is \"multiview\""));
@@ -287,7 +289,11 @@ impl Parameters {
             }
         }
         if self.capture == Capture::Hands && matches!(self.rig, Rig::Arm(_)) {
-            return Err(SceneError::new("rig.kind", "\"arm\" has no hands", "\"figure\" for capture \"hands\""));
+            return Err(SceneError::new(
+                "rig.kind",
+                "\"arm\" has no hands",
+                "\"figure\" for capture \"hands\"",
+            ));
         }
         Ok(())
     }

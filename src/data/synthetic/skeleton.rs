@@ -62,11 +62,41 @@ pub(super) struct Finger {
 }
 
 pub(super) const FINGERS: [Finger; 5] = [
-    Finger { name: "index", knuckle: [0.773, ARM_Y, 0.004], direction: [1.0, -0.03, 0.17], phalanges: [0.036, 0.024, 0.018], radii: [0.0096, 0.0074] },
-    Finger { name: "middle", knuckle: [0.778, ARM_Y + 0.002, -0.020], direction: [1.0, -0.03, 0.02], phalanges: [0.040, 0.027, 0.019], radii: [0.0098, 0.0075] },
-    Finger { name: "pinky", knuckle: [0.762, ARM_Y - 0.004, -0.064], direction: [1.0, -0.03, -0.33], phalanges: [0.028, 0.019, 0.015], radii: [0.0086, 0.0066] },
-    Finger { name: "ring", knuckle: [0.773, ARM_Y, -0.043], direction: [1.0, -0.03, -0.14], phalanges: [0.037, 0.025, 0.018], radii: [0.0094, 0.0072] },
-    Finger { name: "thumb", knuckle: [0.712, ARM_Y - 0.008, 0.006], direction: [0.72, -0.16, 0.68], phalanges: [0.034, 0.028, 0.022], radii: [0.0125, 0.0092] },
+    Finger {
+        name: "index",
+        knuckle: [0.773, ARM_Y, 0.004],
+        direction: [1.0, -0.03, 0.17],
+        phalanges: [0.036, 0.024, 0.018],
+        radii: [0.0096, 0.0074],
+    },
+    Finger {
+        name: "middle",
+        knuckle: [0.778, ARM_Y + 0.002, -0.020],
+        direction: [1.0, -0.03, 0.02],
+        phalanges: [0.040, 0.027, 0.019],
+        radii: [0.0098, 0.0075],
+    },
+    Finger {
+        name: "pinky",
+        knuckle: [0.762, ARM_Y - 0.004, -0.064],
+        direction: [1.0, -0.03, -0.33],
+        phalanges: [0.028, 0.019, 0.015],
+        radii: [0.0086, 0.0066],
+    },
+    Finger {
+        name: "ring",
+        knuckle: [0.773, ARM_Y, -0.043],
+        direction: [1.0, -0.03, -0.14],
+        phalanges: [0.037, 0.025, 0.018],
+        radii: [0.0094, 0.0072],
+    },
+    Finger {
+        name: "thumb",
+        knuckle: [0.712, ARM_Y - 0.008, 0.006],
+        direction: [0.72, -0.16, 0.68],
+        phalanges: [0.034, 0.028, 0.022],
+        radii: [0.0125, 0.0092],
+    },
 ];
 
 /// Joints of a figure: names, parents, rest positions.
@@ -75,13 +105,6 @@ pub(super) struct Joints {
     pub(super) names: Vec<String>,
     pub(super) parents: Vec<Option<usize>>,
     pub(super) positions: Vec<DVec3>,
-}
-
-impl Joints {
-    /// Position of a joint by name.
-    pub(super) fn index(&self, name: &str) -> Option<usize> {
-        self.names.iter().position(|n| n == name)
-    }
 }
 
 /// Where a point of the reference adult is on a figure of other proportions, and back.
@@ -110,7 +133,11 @@ impl Placement {
         let point = point / self.scale();
         let widening = self.widening(point.y);
         let beyond = (point.x.abs() - NECK_HALF_WIDTH - widening).max(0.0);
-        let x = if beyond > 0.0 { NECK_HALF_WIDTH + beyond } else { point.x.abs() / (1.0 + widening / NECK_HALF_WIDTH) };
+        let x = if beyond > 0.0 {
+            NECK_HALF_WIDTH + beyond
+        } else {
+            point.x.abs() / (1.0 + widening / NECK_HALF_WIDTH)
+        };
         DVec3::new(x.copysign(point.x), point.y, point.z)
     }
 }

@@ -27,11 +27,8 @@ pub(super) fn cameras(parameters: &Parameters, role: Role) -> Vec<Camera> {
     let side = parameters.resolution;
     let focal = f64::from(side) / 2.0 * framing.distance / framing.half_extent;
     let camera = |azimuth: f64, elevation: f64| {
-        let direction = DVec3::new(
-            azimuth.sin() * elevation.cos(),
-            elevation.sin(),
-            azimuth.cos() * elevation.cos(),
-        );
+        let direction =
+            DVec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos());
         let eye = framing.target + direction * framing.distance;
         Camera::look_at(eye, framing.target, DVec3::Y, focal, side, side)
     };

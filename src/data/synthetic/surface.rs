@@ -76,6 +76,8 @@ struct NetVertex {
     cell: Cell,
     /// Bit c is set if corner c of the cell belongs to the group; corner c is at (c & 1, c >> 1 & 1, c >> 2).
     corners: u8,
+    /// Index of the octree leaf that the cell belongs to.
+    leaf: usize,
     position: DVec3,
 }
 
@@ -84,24 +86,57 @@ struct NetVertex {
 pub(super) struct Mesh {
     pub(super) vertices: Vec<DVec3>,
     pub(super) faces: Vec<[u32; 3]>,
+    /// Index of the field's part that is nearest, per vertex.
+    pub(super) parts: Vec<usize>,
+}
+
+/// The field around one octree leaf.
+struct Region<'a> {
+    whole: &'a Field,
+    local: Field,
+    centre: DVec3,
+    radius: f64,
+}
+
+impl<'a> Region<'a> {
+    fn new(whole: &'a Field, warp: &Warp, leaf: Cell) -> Self {
+        let centre = warp.world(grid_point(leaf) + f64::from(LEAF) / 2.0);
+        // Half the diagonal, and two cells for vertices that slide out of the leaf.
+        let radius = warp.cell * (f64::from(LEAF) * 3f64.sqrt() / 2.0 + 2.0);
+        Self { whole, local: whole.near(centre, radius), centre, radius }
+    }
+
+    fn field_at(&self, point: DVec3) -> &Field {
+        if (point - self.centre).length() < self.radius { &self.local } else { self.whole }
+    }
 }
 
 /// Meshes the zero level of a field with cells of `cell` metres, finer under the lenses.
 pub(super) fn mesh(field: &Field, cell: f64, lenses: &[Lens]) -> Mesh {
     let warp = Warp::new(cell, lenses);
-    let nets: Vec<(Vec<NetVertex>, Vec<Crossing>)> =
-        leaves(field, &warp).par_iter().map(|&leaf| net_in_leaf(field, &warp, leaf)).collect();
-    let mut net: Vec<NetVertex> = Vec::new();
-    let mut crossings = Vec::new();
+    let leaves = leaves(field, &warp);
+    let regions: Vec<Region<'_>> = leaves.par_iter().map(|&leaf| Region::new(field, &warp, leaf)).collect();
+    let nets: Vec<(Vec<NetVertex>, Vec<Crossing>)> = leaves
+        .par_iter()
+        .enumerate()
+        .map(|(i, &leaf)| net_in_leaf(&regions[i].local, &warp, leaf, i))
+        .collect();
+    let (mut net, mut crossings) = (Vec::new(), Vec::new());
     for (vertices, edges) in nets {
         net.extend(vertices);
         crossings.extend(edges);
     }
     net.sort_by_key(|v| (v.cell, v.corners));
     let quads: Vec<[u32; 4]> = crossings.iter().filter_map(|edge| edge.quad(&net)).collect();
-    let mut vertices: Vec<DVec3> = net.iter().map(|v| v.position).collect();
-    relax(field, &mut vertices, &quads);
-    Mesh { faces: split(&vertices, &quads), vertices }
+    let vertices = relaxed(&regions, &net, &quads);
+    let part = |(vertex, &position): (&NetVertex, &DVec3)| {
+        regions[vertex.leaf].field_at(position).nearest_part(position)
+    };
+    Mesh {
+        parts: net.par_iter().zip(&vertices).map(part).collect(),
+        faces: split(&vertices, &quads),
+        vertices,
+    }
 }
 
 /// Octree leaves that may hold surface, in a fixed order.
@@ -127,7 +162,9 @@ fn leaves(field: &Field, warp: &Warp) -> Vec<Cell> {
             continue;
         }
         let half = size / 2;
-        stack.extend((0..8).map(|c| (std::array::from_fn(|axis| corner[axis] + half * (c >> axis & 1)), half)));
+        stack.extend(
+            (0..8).map(|c| (std::array::from_fn(|axis| corner[axis] + half * (c >> axis & 1)), half)),
+        );
     }
     leaves
 }
@@ -167,7 +204,7 @@ impl Crossing {
     }
 }
 
-fn net_in_leaf(field: &Field, warp: &Warp, leaf: Cell) -> (Vec<NetVertex>, Vec<Crossing>) {
+fn net_in_leaf(field: &Field, warp: &Warp, leaf: Cell, leaf_index: usize) -> (Vec<NetVertex>, Vec<Crossing>) {
     let index = |p: [usize; 3]| p[0] + SIDE * (p[1] + SIDE * p[2]);
     let positions = |i: usize| [i % SIDE, i / SIDE % SIDE, i / (SIDE * SIDE)];
     let global = |p: [usize; 3]| -> Cell { std::array::from_fn(|axis| leaf[axis] + p[axis] as i32) };
@@ -183,7 +220,7 @@ fn net_in_leaf(field: &Field, warp: &Warp, leaf: Cell) -> (Vec<NetVertex>, Vec<C
         }
         for group in inside_groups(inside) {
             let position = warp.world(grid_point(global(cell)) + mean_crossing(&corners, group, inside));
-            vertices.push(NetVertex { cell: global(cell), corners: group, position });
+            vertices.push(NetVertex { cell: global(cell), corners: group, leaf: leaf_index, position });
         }
         let lower_inside = inside & 1 == 1;
         for axis in (0..3).filter(|axis| (inside >> (1 << axis) & 1 == 1) != lower_inside) {
@@ -200,9 +237,12 @@ fn inside_groups(inside: u8) -> Vec<u8> {
     while left != 0 {
         let mut group = left & left.wrapping_neg();
         loop {
-            let neighbours = (group & 0x55) << 1 | (group & 0xaa) >> 1
-                | (group & 0x33) << 2 | (group & 0xcc) >> 2
-                | group << 4 | group >> 4;
+            let neighbours = (group & 0x55) << 1
+                | (group & 0xaa) >> 1
+                | (group & 0x33) << 2
+                | (group & 0xcc) >> 2
+                | group << 4
+                | group >> 4;
             let grown = group | (neighbours & inside);
             if grown == group {
                 break;
@@ -231,26 +271,29 @@ fn mean_crossing(corners: &[f64; 8], group: u8, inside: u8) -> DVec3 {
 
 const RELAXATIONS: usize = 12;
 
-/// Moves vertices towards the mean of their neighbours along the surface, and back onto it by Newton steps.
-fn relax(field: &Field, vertices: &mut Vec<DVec3>, quads: &[[u32; 4]]) {
-    let neighbours = quad_neighbours(vertices.len(), quads);
+/// Vertices moved towards the mean of their neighbours along the surface, and back onto it by Newton steps: one per round,
+/// and two at the end.
+fn relaxed(regions: &[Region<'_>], net: &[NetVertex], quads: &[[u32; 4]]) -> Vec<DVec3> {
+    let neighbours = quad_neighbours(net.len(), quads);
+    let project = |i: usize, position: DVec3| {
+        let here = regions[net[i].leaf].field_at(position).sample(position);
+        let slope = here.gradient.length_squared();
+        let step = if slope > 1e-2 { here.gradient * (here.distance / slope) } else { DVec3::ZERO };
+        (position - step, here.gradient.normalize_or_zero())
+    };
+    let mut state: Vec<(DVec3, DVec3)> =
+        net.par_iter().enumerate().map(|(i, vertex)| project(i, vertex.position)).collect();
     for _ in 0..RELAXATIONS {
-        let moved = |(&vertex, around): (&DVec3, &Vec<u32>)| {
-            let mean = around.iter().map(|&i| vertices[i as usize]).sum::<DVec3>() / around.len() as f64;
-            let normal = field.sample(vertex).gradient.normalize_or_zero();
+        let moved = |(i, around): (usize, &Vec<u32>)| {
+            let (vertex, normal) = state[i];
+            let mean = around.iter().map(|&k| state[k as usize].0).sum::<DVec3>() / around.len() as f64;
             let step = (mean - vertex) * 0.6;
-            let mut position = vertex + step - normal * step.dot(normal);
-            for _ in 0..2 {
-                let here = field.sample(position);
-                let slope = here.gradient.length_squared();
-                if slope > 1e-2 {
-                    position -= here.gradient * (here.distance / slope);
-                }
-            }
-            position
+            project(i, vertex + step - normal * step.dot(normal))
         };
-        *vertices = vertices.par_iter().zip(&neighbours).map(moved).collect();
+        state = neighbours.par_iter().enumerate().map(moved).collect();
     }
+    let polished = |(i, &(vertex, _)): (usize, &(DVec3, DVec3))| project(i, project(i, vertex).0).0;
+    state.par_iter().enumerate().map(polished).collect()
 }
 
 fn quad_neighbours(count: usize, quads: &[[u32; 4]]) -> Vec<Vec<u32>> {

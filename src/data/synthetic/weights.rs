@@ -123,7 +123,12 @@ fn finger_gates(
     let mut gates = vec![Gate::Above { point, normal: direction, width: 0.011 * softness * scale }];
     if phalanx == "1" {
         let radius = finger.radii[0] * scale;
-        gates.push(Gate::Around { point, direction, inner: 1.15 * radius, outer: 1.15 * radius + 0.008 * scale });
+        gates.push(Gate::Around {
+            point,
+            direction,
+            inner: 1.15 * radius,
+            outer: 1.15 * radius + 0.008 * scale,
+        });
     }
     Some(gates)
 }
@@ -132,7 +137,11 @@ fn finger_gates(
 ///
 /// # Errors
 /// Never for claims of the joints they were made from; the table checks itself.
-pub(super) fn weigh(joints: &Joints, claims: &[Claim], vertices: &[DVec3]) -> Result<SkinWeights, SceneError> {
+pub(super) fn weigh(
+    joints: &Joints,
+    claims: &[Claim],
+    vertices: &[DVec3],
+) -> Result<SkinWeights, SceneError> {
     let rows = vertices.iter().map(|&vertex| row(joints, claims, vertex));
     SkinWeights::from_rows(rows, joints.positions.len())
 }
