@@ -46,7 +46,7 @@ fn default_bodies_are_closed_spheres_of_good_triangles() {
         let euler = body.vertices.len() as i64 - body.faces.len() as i64 / 2;
         assert_eq!(euler, 2, "{name}: no handles, one piece");
         if matches!(subject.parameters().rig, Rig::Figure(_)) {
-            assert!((5_000..=16_500).contains(&body.vertices.len()), "{name}: {}", body.vertices.len());
+            assert!((5_000..=15_000).contains(&body.vertices.len()), "{name}: {}", body.vertices.len());
         }
         let smallest_angle = |f: &[u32; 3]| {
             let p = f.map(|i| body.vertices[i as usize]);
@@ -87,7 +87,7 @@ fn weights_are_few_smooth_and_use_every_joint() {
             let joints: BTreeSet<u16> = a.keys().chain(b.keys()).copied().collect();
             for j in joints {
                 let jump = (a.get(&j).unwrap_or(&0.0) - b.get(&j).unwrap_or(&0.0)).abs();
-                assert!(jump < 0.75, "{name}: {} jumps by {jump}", body.skeleton.names[usize::from(j)]);
+                assert!(jump < 0.6, "{name}: {} jumps by {jump}", body.skeleton.names[usize::from(j)]);
             }
         }
     }
@@ -192,7 +192,7 @@ fn charts_cover_the_surface_without_overlap() {
             }
         }
         assert_eq!(clashes, 0, "{name}: texels with two faces");
-        assert!(covered > SIDE * SIDE * 2 / 5, "{name}: {covered} texels used");
+        assert!(covered > SIDE * SIDE / 3, "{name}: {covered} texels used");
     }
 }
 

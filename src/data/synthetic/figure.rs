@@ -39,7 +39,7 @@ fn build_human(shape: FigureShape, fingers: bool) -> Result<Figure, SceneError> 
     let proportions = Proportions { height, girth, shoulders };
     let place = Placement(proportions);
     let field = flesh::flesh(proportions);
-    let mesh = surface::mesh(&field, edge, &flesh::lenses(proportions));
+    let mesh = surface::mesh(&field, edge, &flesh::lenses(proportions, edge));
     let joints = figure_joints(proportions, fingers);
     let claims = weights::figure_claims(&joints, place, softness);
     let material = |v: &DVec3| place.reference(*v).as_vec3();
@@ -62,7 +62,9 @@ fn build_arm(shape: ArmShape) -> Result<Figure, SceneError> {
         parts: vec![Part::new(vec![Capsule::new(-end, radius, end, radius)], 0.01, 0.01)],
         floor: None,
     };
-    let mesh = surface::mesh(&field, edge, &[]);
+    let mut mesh = surface::mesh(&field, edge, &[]);
+    // One part per bone, so that charts are short enough to pack.
+    mesh.parts = mesh.vertices.iter().map(|v| ((v.x - start) / bone).max(0.0) as usize).collect();
     let claims = weights::chain_claims(&joints, softness * bone);
     let material = |v: &DVec3| DVec3::new((v.x - start) / bone, v.y / radius, v.z / radius).as_vec3();
     let material_positions = mesh.vertices.iter().map(material).collect();
@@ -90,7 +92,7 @@ fn assemble(
         Skeleton::from_joint_positions(joints.names.clone(), joints.parents.clone(), &joints.positions)?;
     let body = RestBody {
         skeleton,
-        weights: weights::weigh(joints, claims, &vertices)?,
+        weights: weights::weigh(joints, claims, &vertices, &faces)?,
         uv: Some(atlas::unwrap(&vertices, &faces, &face_parts)),
         vertices,
         faces,

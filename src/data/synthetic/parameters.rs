@@ -195,7 +195,7 @@ impl Default for Parameters {
 
 impl Default for FigureShape {
     fn default() -> Self {
-        Self { height: 1.74, girth: 1.0, shoulders: 1.0, softness: 1.0, edge: 0.023 }
+        Self { height: 1.74, girth: 1.0, shoulders: 1.0, softness: 1.0, edge: 0.026 }
     }
 }
 
