@@ -13,8 +13,9 @@ const GUTTER: f64 = 2.0 / 512.0;
 pub(super) fn unwrap(vertices: &[DVec3], faces: &[[u32; 3]], parts: &[usize]) -> Uv {
     let neighbours = face_neighbours(faces);
     let normals: Vec<DVec3> = faces.iter().map(|f| face_normal(vertices, f)).collect();
-    let charts = connected(&smoothed_labels(&normals, parts, &neighbours), &neighbours);
-    let flat: Vec<Chart> = charts.into_iter().map(|c| Chart::project(vertices, faces, &normals, c)).collect();
+    let labels = smoothed_labels(&normals, parts, &neighbours);
+    let charts = components(vertices, faces, &labels, &neighbours);
+    let flat: Vec<Chart> = charts.into_iter().map(|c| Chart::project(vertices, faces, c)).collect();
     pack(faces.len(), flat)
 }
 
@@ -39,7 +40,7 @@ fn face_neighbours(faces: &[[u32; 3]]) -> Vec<Vec<usize>> {
 
 /// Axis 2 a + s: axis a, positive for s = 0.
 fn axis_vector(axis: usize) -> DVec3 {
-    let sign = if axis % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = if axis.is_multiple_of(2) { 1.0 } else { -1.0 };
     DVec3::AXES[axis / 2] * sign
 }
 
@@ -64,31 +65,98 @@ fn smoothed_labels(normals: &[DVec3], parts: &[usize], neighbours: &[Vec<usize>]
     labels
 }
 
-/// Faces of one label that hang together.
+/// The plane orthogonal to an axis: u x v = axis, so that charts are not mirrored.
+fn projected(position: DVec3, axis: usize) -> DVec2 {
+    let u = DVec3::AXES[(axis / 2 + 1) % 3];
+    let v = axis_vector(axis).cross(u);
+    DVec2::new(position.dot(u), position.dot(v))
+}
+
+/// Faces of one label that hang together and do not overlap when projected.
 struct Component {
     axis: usize,
     faces: Vec<usize>,
 }
 
-fn connected(labels: &[(usize, usize)], neighbours: &[Vec<usize>]) -> Vec<Component> {
-    let mut seen = vec![false; labels.len()];
+fn components(
+    vertices: &[DVec3],
+    faces: &[[u32; 3]],
+    labels: &[(usize, usize)],
+    neighbours: &[Vec<usize>],
+) -> Vec<Component> {
+    let mut taken = vec![false; faces.len()];
     let mut components = Vec::new();
-    for start in 0..labels.len() {
-        if std::mem::replace(&mut seen[start], true) {
+    let mut start = 0;
+    while start < faces.len() {
+        if taken[start] {
+            start += 1;
             continue;
         }
-        let (mut faces, mut next) = (vec![start], 0);
-        while let Some(&face) = faces.get(next) {
+        let axis = labels[start].1;
+        let mut plane = Plane::default();
+        let (mut members, mut next, mut refused) = (Vec::new(), 0, None::<usize>);
+        let mut candidates = vec![start];
+        while let Some(&face) = candidates.get(next) {
             next += 1;
-            for &other in &neighbours[face] {
-                if labels[other] == labels[start] && !std::mem::replace(&mut seen[other], true) {
-                    faces.push(other);
-                }
+            let corners = faces[face].map(|i| projected(vertices[i as usize], axis));
+            if taken[face] {
+                continue;
             }
+            // A fold over what is there already (an ear over the head) starts a chart of its own.
+            if !plane.place(corners) {
+                refused = Some(refused.map_or(face, |first| first.min(face)));
+                continue;
+            }
+            taken[face] = true;
+            members.push(face);
+            candidates.extend(neighbours[face].iter().filter(|&&n| labels[n] == labels[start] && !taken[n]));
         }
-        components.push(Component { axis: labels[start].1, faces });
+        components.push(Component { axis, faces: members });
+        start = refused.map_or(start, |face| face.min(start));
     }
     components
+}
+
+/// Side of the squares that [`Plane`] sorts triangles into, metres.
+const BUCKET: f64 = 0.02;
+
+/// Triangles in a plane, none of which overlap.
+#[derive(Default)]
+struct Plane {
+    triangles: Vec<[DVec2; 3]>,
+    buckets: BTreeMap<(i32, i32), Vec<usize>>,
+}
+
+impl Plane {
+    /// Adds a counter-clockwise triangle, unless it overlaps one that is there.
+    fn place(&mut self, corners: [DVec2; 3]) -> bool {
+        let bucket = |p: DVec2| (p / BUCKET).floor().as_ivec2();
+        let low = bucket(corners[0].min(corners[1]).min(corners[2]));
+        let high = bucket(corners[0].max(corners[1]).max(corners[2]));
+        let keys: Vec<(i32, i32)> =
+            (low.x..=high.x).flat_map(|x| (low.y..=high.y).map(move |y| (x, y))).collect();
+        let clashes = |&i: &usize| overlap(&corners, &self.triangles[i]);
+        if keys.iter().any(|key| self.buckets.get(key).is_some_and(|b| b.iter().any(clashes))) {
+            return false;
+        }
+        for key in keys {
+            self.buckets.entry(key).or_default().push(self.triangles.len());
+        }
+        self.triangles.push(corners);
+        true
+    }
+}
+
+/// Do two counter-clockwise triangles share more than border? (Separating axes; exact for triangles that share an edge or
+/// a vertex, whose differences cancel to zero.)
+fn overlap(a: &[DVec2; 3], b: &[DVec2; 3]) -> bool {
+    let outside = |edges: &[DVec2; 3], points: &[DVec2; 3]| {
+        (0..3).any(|k| {
+            let edge = edges[(k + 1) % 3] - edges[k];
+            points.iter().all(|&p| edge.perp_dot(p - edges[k]) <= 0.0)
+        })
+    };
+    !outside(a, b) && !outside(b, a)
 }
 
 /// A flat chart, metres, with its lower corner at the origin.
@@ -100,20 +168,14 @@ struct Chart {
 }
 
 impl Chart {
-    fn project(vertices: &[DVec3], faces: &[[u32; 3]], normals: &[DVec3], component: Component) -> Self {
-        debug_assert!(component.faces.iter().all(|&f| normals[f].dot(axis_vector(component.axis)) > -0.1));
-        // u x v = axis, so that charts are not mirrored.
-        let axis = axis_vector(component.axis);
-        let u = DVec3::AXES[(component.axis / 2 + 1) % 3];
-        let v = axis.cross(u);
+    fn project(vertices: &[DVec3], faces: &[[u32; 3]], component: Component) -> Self {
         let mut index = BTreeMap::new();
         let mut points: Vec<DVec2> = Vec::new();
         let mut chart_faces = Vec::with_capacity(component.faces.len());
         for face in component.faces {
             let corners = faces[face].map(|vertex| {
                 *index.entry(vertex).or_insert_with(|| {
-                    let position = vertices[vertex as usize];
-                    points.push(DVec2::new(position.dot(u), position.dot(v)));
+                    points.push(projected(vertices[vertex as usize], component.axis));
                     points.len() as u32 - 1
                 })
             });

@@ -70,10 +70,12 @@ impl Capsule {
 /// Quadratic smooth minimum: differs from the minimum only where `|a - b| < radius`, by at most `radius / 4`.
 fn smooth_min(a: Sample, b: Sample, radius: f64) -> Sample {
     let (near, far) = if a.distance <= b.distance { (a, b) } else { (b, a) };
-    let overlap = 1.0 - (far.distance - near.distance) / radius;
-    if overlap <= 0.0 {
+    // Also true where both are infinite (nothing there).
+    let apart = far.distance == f64::INFINITY || far.distance - near.distance >= radius;
+    if apart {
         return near;
     }
+    let overlap = 1.0 - (far.distance - near.distance) / radius;
     Sample {
         distance: near.distance - overlap * overlap * radius / 4.0,
         gradient: near.gradient.lerp(far.gradient, overlap / 2.0),
@@ -103,6 +105,15 @@ impl Part {
         Self { reach: reach + blend, capsules, blend, join, centre }
     }
 
+    /// The capsules that matter within `radius` of `centre`: farther ones than twice the blending radius behind the
+    /// nearest neither touch it nor anything that does, so that samples there stay the same to the last bit.
+    fn near(&self, centre: DVec3, radius: f64, reach_of_union: f64) -> Self {
+        let (nearest, reach) = (self.sample(centre).distance, 2.0 * (radius + self.blend));
+        let matters = nearest < reach_of_union + 2.0 * (radius + self.join);
+        let near = |capsule: &&Capsule| matters && capsule.sample(centre).distance < nearest + reach;
+        Self { capsules: self.capsules.iter().filter(near).copied().collect(), ..*self }
+    }
+
     fn sample(&self, point: DVec3) -> Sample {
         let mut samples = self.capsules.iter().map(|c| c.sample(point));
         let Some(first) = samples.next() else {
@@ -121,8 +132,8 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// The signed distance bound and its gradient.
-    pub(super) fn sample(&self, point: DVec3) -> Sample {
+    /// The smooth union of the parts, without the floor.
+    fn union(&self, point: DVec3) -> Sample {
         let mut sum = Sample { distance: f64::INFINITY, gradient: DVec3::ZERO };
         for part in &self.parts {
             // Beyond the blending radius a part changes nothing: skipping it is exact.
@@ -130,10 +141,25 @@ impl Field {
                 sum = smooth_min(part.sample(point), sum, part.join);
             }
         }
+        sum
+    }
+
+    /// The signed distance bound and its gradient.
+    pub(super) fn sample(&self, point: DVec3) -> Sample {
+        let sum = self.union(point);
         let Some((height, radius)) = self.floor else { return sum };
         let flip = |s: Sample| Sample { distance: -s.distance, gradient: -s.gradient };
         let below = Sample { distance: height - point.y, gradient: -DVec3::Y };
         flip(smooth_min(flip(sum), flip(below), radius))
+    }
+
+    /// The same field within `radius` of `centre`, made of fewer capsules.
+    pub(super) fn near(&self, centre: DVec3, radius: f64) -> Self {
+        let nearest = self.union(centre).distance;
+        Self {
+            parts: self.parts.iter().map(|p| p.near(centre, radius, nearest)).collect(),
+            floor: self.floor,
+        }
     }
 
     /// The signed distance bound.
@@ -182,6 +208,17 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_local_field_is_the_field_to_the_last_bit(
+            c in prop::array::uniform3(-1.0f64..2.0), o in prop::array::uniform3(-1.0f64..1.0), radius in 0.01f64..0.6
+        ) {
+            let (field, centre) = (field(), DVec3::from_array(c));
+            let point = centre + DVec3::from_array(o).clamp_length_max(1.0) * radius * 0.999;
+            let (whole, local) = (field.sample(point), field.near(centre, radius).sample(point));
+            prop_assert_eq!(whole.distance.to_bits(), local.distance.to_bits());
+            prop_assert_eq!(whole.gradient, local.gradient);
+        }
+
         #[test]
         fn the_gradient_is_the_derivative_and_at_most_one(x in -1.0f64..2.0, y in -1.0f64..2.0, z in -1.0f64..2.0) {
             let (field, p) = (field(), DVec3::new(x, y, z));

@@ -7,6 +7,7 @@ use super::{atlas, flesh, surface, weights};
 use crate::scene::body::vertex_normals;
 use crate::scene::{RestBody, SceneError, Skeleton};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A body and the surface attributes that belong to its vertices.
@@ -38,7 +39,7 @@ fn build_human(shape: FigureShape, fingers: bool) -> Result<Figure, SceneError> 
     let proportions = Proportions { height, girth, shoulders };
     let place = Placement(proportions);
     let field = flesh::flesh(proportions);
-    let mesh = surface::mesh(&field, edge, &flesh::lenses(proportions));
+    let mesh = surface::mesh(&field, edge, &flesh::lenses(proportions, edge));
     let joints = figure_joints(proportions, fingers);
     let claims = weights::figure_claims(&joints, place, softness);
     let material = |v: &DVec3| place.reference(*v).as_vec3();
@@ -61,7 +62,9 @@ fn build_arm(shape: ArmShape) -> Result<Figure, SceneError> {
         parts: vec![Part::new(vec![Capsule::new(-end, radius, end, radius)], 0.01, 0.01)],
         floor: None,
     };
-    let mesh = surface::mesh(&field, edge, &[]);
+    let mut mesh = surface::mesh(&field, edge, &[]);
+    // One part per bone, so that charts are short enough to pack.
+    mesh.parts = mesh.vertices.iter().map(|v| ((v.x - start) / bone).max(0.0) as usize).collect();
     let claims = weights::chain_claims(&joints, softness * bone);
     let material = |v: &DVec3| DVec3::new((v.x - start) / bone, v.y / radius, v.z / radius).as_vec3();
     let material_positions = mesh.vertices.iter().map(material).collect();
@@ -76,17 +79,21 @@ fn assemble(
     material_positions: Vec<Vec3>,
     crease: f64,
 ) -> Result<Figure, SceneError> {
-    let surface::Mesh { vertices, faces } = mesh;
-    let centroid = |f: &[u32; 3]| f.map(|i| vertices[i as usize]).into_iter().sum::<DVec3>() / 3.0;
-    let parts: Vec<usize> = faces.iter().map(|f| field.nearest_part(centroid(f))).collect();
+    let surface::Mesh { vertices, faces, parts } = mesh;
+    // A face on the border between parts belongs to the one in the middle of the order: the majority, if there is one.
+    let middle = |mut labels: [usize; 3]| {
+        labels.sort_unstable();
+        labels[1]
+    };
+    let face_parts: Vec<usize> = faces.iter().map(|f| middle(f.map(|i| parts[i as usize]))).collect();
     let normals = vertex_normals(&vertices, &faces);
-    let openness = vertices.iter().zip(&normals).map(|(&v, &n)| openness(field, v, n, crease)).collect();
+    let openness = vertices.par_iter().zip(&normals).map(|(&v, &n)| openness(field, v, n, crease)).collect();
     let skeleton =
         Skeleton::from_joint_positions(joints.names.clone(), joints.parents.clone(), &joints.positions)?;
     let body = RestBody {
         skeleton,
-        weights: weights::weigh(joints, claims, &vertices)?,
-        uv: Some(atlas::unwrap(&vertices, &faces, &parts)),
+        weights: weights::weigh(joints, claims, &vertices, &faces)?,
+        uv: Some(atlas::unwrap(&vertices, &faces, &face_parts)),
         vertices,
         faces,
         pose_directions: Vec::new(),

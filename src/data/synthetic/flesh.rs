@@ -28,16 +28,16 @@ pub(super) fn flesh(proportions: Proportions) -> Field {
     Field { parts, floor: Some((0.0, 0.012 * pen.place.scale())) }
 }
 
-/// Where the mesh is finer.
-pub(super) fn lenses(proportions: Proportions) -> Vec<Lens> {
+/// Where the mesh is finer than `edge`: fingers need cells of 5.6 mm to stay apart, a face some of 12 mm.
+pub(super) fn lenses(proportions: Proportions, edge: f64) -> Vec<Lens> {
     let place = Placement(proportions);
-    let hand = |mirror: f64| Lens {
-        centre: place.point([mirror * 0.79, ARM_Y, ARM_Z + 0.01]),
-        radius: 0.075,
-        power: 3.6,
+    let lens = |centre: [f64; 3], radius: f64, cell: f64| Lens {
+        centre: place.point(centre),
+        radius: radius * place.scale(),
+        power: (edge / (cell * place.scale())).max(1.0),
     };
-    let head = Lens { centre: place.point([0.0, 1.62, 0.06]), radius: 0.09, power: 2.0 };
-    vec![head, hand(1.0), hand(-1.0)]
+    let hand = |mirror: f64| lens([mirror * 0.79, ARM_Y, ARM_Z + 0.01], 0.068, 0.0056);
+    vec![lens([0.0, 1.62, 0.06], 0.085, 0.0125), hand(1.0), hand(-1.0)]
 }
 
 /// Draws capsules given on the reference adult's left side.
@@ -129,9 +129,9 @@ fn hand(pen: Pen) -> Vec<Capsule> {
         pen.bone([0.700, ARM_Y - 0.004, -0.012], 0.016, [0.722, ARM_Y - 0.008, 0.014], 0.014), // ball of the thumb
     ];
     // Webs between the fingers.
-    hand.push(pen.bone([0.771, ARM_Y - 0.001, 0.002], 0.0085, [0.775, ARM_Y, -0.020], 0.0085));
-    hand.push(pen.bone([0.775, ARM_Y, -0.020], 0.0085, [0.771, ARM_Y - 0.001, -0.043], 0.0085));
-    hand.push(pen.bone([0.771, ARM_Y - 0.001, -0.043], 0.0085, [0.758, ARM_Y - 0.004, -0.062], 0.008));
+    hand.push(pen.bone([0.778, ARM_Y - 0.001, 0.003], 0.0085, [0.782, ARM_Y, -0.020], 0.0085));
+    hand.push(pen.bone([0.782, ARM_Y, -0.020], 0.0085, [0.778, ARM_Y - 0.001, -0.044], 0.0085));
+    hand.push(pen.bone([0.778, ARM_Y - 0.001, -0.044], 0.0085, [0.765, ARM_Y - 0.004, -0.065], 0.008));
     for finger in &FINGERS {
         let points = finger.points();
         let [at_knuckle, at_tip] = finger.radii;

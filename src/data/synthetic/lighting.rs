@@ -99,3 +99,36 @@ pub(super) fn to_srgb(radiance: Vec3) -> [f32; 3] {
 pub(super) fn to_linear(srgb: [f32; 3]) -> Vec3 {
     Vec3::from_array(srgb.map(|c| if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_of_lights_are_unit_vectors() {
+        LIGHTS.iter().for_each(|light| assert!((light.direction.length() - 1.0).abs() < 1e-5));
+    }
+
+    #[test]
+    fn without_reflectance_the_view_does_not_matter_and_with_it_it_does() {
+        let normal = Vec3::new(0.3, 0.4, 0.9).normalize();
+        let views = [normal, Vec3::Z, Vec3::new(0.8, 0.1, 0.6).normalize()];
+        let seen = |reflectance| {
+            let finish = Finish { albedo: Vec3::new(0.5, 0.3, 0.2), roughness: 0.3, reflectance };
+            views.map(|view| shade(finish, normal, view, 1.0))
+        };
+        let [a, b, c] = seen(0.0);
+        assert!(a == b && b == c);
+        let [a, b, c] = seen(0.045);
+        assert!((a - b).length() > 0.01 && (b - c).length() > 0.01);
+    }
+
+    #[test]
+    fn srgb_is_monotone_bounded_and_exact_below_the_knee() {
+        let values: Vec<f32> = (0..2000).map(|i| to_srgb(Vec3::splat(i as f32 * 0.005))[0]).collect();
+        assert!(values.windows(2).all(|w| w[1] >= w[0]) && values.iter().all(|v| (0.0..=1.0).contains(v)));
+        for c in [0.0, 0.01, 0.2, 0.8] {
+            assert!((to_srgb(to_linear([c; 3]))[0] - c).abs() < 1e-6);
+        }
+    }
+}

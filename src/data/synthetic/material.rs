@@ -147,7 +147,8 @@ impl Material {
     }
 
     fn torso(&self, p: Vec3) -> Finish {
-        let arc = 0.14 * p.x.atan2(p.z + 0.01);
+        // Along the surface from the middle to the flanks: across in front and behind, backwards at the sides.
+        let arc = p.x.abs() - 0.7 * p.z;
         let mut colour = self.pattern(Vec2::new(p.y, arc) * self.rate(), self.shirt);
         if p.z > 0.0 {
             colour = self.emblem(Vec2::new(p.x, p.y - 1.27) / 0.075, colour);
@@ -186,7 +187,7 @@ impl Material {
 
     fn sleeve(&self, p: Vec3) -> Finish {
         let out = p.x.abs();
-        if out < 0.160 || out > 0.640 {
+        if !(0.160..=0.640).contains(&out) {
             return self.cloth(self.shirt[2], p, 0.62);
         }
         let around = (p.y - ARM_Y as f32).atan2(p.z - ARM_Z as f32) / TAU;

@@ -18,6 +18,7 @@
 //! | hands | `train`: gestures of the upper body | `test_fingers` |
 
 mod atlas;
+mod cell;
 mod field;
 mod figure;
 mod flesh;

@@ -143,7 +143,7 @@ impl Actor<'_> {
             [30.0 * sway(2.0, 0.8), 0.0, 0.0],
         );
         for (side, shift) in [("left", 0.0), ("right", 0.5)] {
-            let lift = (life * wave(3.0, t, shift)).max(0.0).powi(2);
+            let lift = life * wave(3.0, t, shift).max(0.0).powi(2);
             self.rotate(&format!("{side}_hip"), [-10.0 - 42.0 * lift, 0.0, 0.0]);
             self.rotate(&format!("{side}_knee"), [18.0 + 58.0 * lift, 0.0, 0.0]);
             self.rotate(&format!("{side}_ankle"), [-8.0 + 12.0 * lift, 0.0, 0.0]);

@@ -65,7 +65,7 @@ pub(super) const FINGERS: [Finger; 5] = [
     Finger {
         name: "index",
         knuckle: [0.773, ARM_Y, 0.004],
-        direction: [1.0, -0.03, 0.17],
+        direction: [1.0, -0.03, 0.19],
         phalanges: [0.036, 0.024, 0.018],
         radii: [0.0096, 0.0074],
     },
@@ -79,14 +79,14 @@ pub(super) const FINGERS: [Finger; 5] = [
     Finger {
         name: "pinky",
         knuckle: [0.762, ARM_Y - 0.004, -0.064],
-        direction: [1.0, -0.03, -0.33],
+        direction: [1.0, -0.03, -0.37],
         phalanges: [0.028, 0.019, 0.015],
         radii: [0.0086, 0.0066],
     },
     Finger {
         name: "ring",
         knuckle: [0.773, ARM_Y, -0.043],
-        direction: [1.0, -0.03, -0.14],
+        direction: [1.0, -0.03, -0.15],
         phalanges: [0.037, 0.025, 0.018],
         radii: [0.0094, 0.0072],
     },
@@ -105,13 +105,6 @@ pub(super) struct Joints {
     pub(super) names: Vec<String>,
     pub(super) parents: Vec<Option<usize>>,
     pub(super) positions: Vec<DVec3>,
-}
-
-impl Joints {
-    /// Position of a joint by name.
-    pub(super) fn index(&self, name: &str) -> Option<usize> {
-        self.names.iter().position(|n| n == name)
-    }
 }
 
 /// Where a point of the reference adult is on a figure of other proportions, and back.

@@ -113,14 +113,7 @@ impl Subject {
             }
         };
         let frames = (0..poses.len() * cameras.len()).map(frame).collect();
-        Sequence {
-            id: id.to_owned(),
-            body: Arc::clone(self.body()),
-            poses,
-            cameras,
-            frames,
-            stored_sizes: None,
-        }
+        Sequence { id: id.to_owned(), body: Arc::clone(self.body()), poses, cameras, frames, stored_sizes: None }
     }
 }
 

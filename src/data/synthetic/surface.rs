@@ -4,6 +4,7 @@
 //! The mesh is closed and consistently oriented by construction: every grid edge that crosses the surface gives one
 //! quad between the four cells around it.
 
+use super::cell::{edge, mean_crossing, sheets_of_all_cases};
 use super::field::Field;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -71,11 +72,13 @@ type Cell = [i32; 3];
 const LEAF: i32 = 4;
 const SIDE: usize = LEAF as usize + 1;
 
-/// A vertex of the net: one per cell and connected group of inside corners.
+/// A vertex of the net: one per cell and sheet of the surface in it.
 struct NetVertex {
     cell: Cell,
-    /// Bit c is set if corner c of the cell belongs to the group; corner c is at (c & 1, c >> 1 & 1, c >> 2).
-    corners: u8,
+    /// A bit per edge of the cell that the sheet crosses.
+    sheet: u16,
+    /// Index of the octree leaf that the cell belongs to.
+    leaf: usize,
     position: DVec3,
 }
 
@@ -84,24 +87,58 @@ struct NetVertex {
 pub(super) struct Mesh {
     pub(super) vertices: Vec<DVec3>,
     pub(super) faces: Vec<[u32; 3]>,
+    /// Index of the field's part that is nearest, per vertex.
+    pub(super) parts: Vec<usize>,
+}
+
+/// The field around one octree leaf.
+struct Region<'a> {
+    whole: &'a Field,
+    local: Field,
+    centre: DVec3,
+    radius: f64,
+}
+
+impl<'a> Region<'a> {
+    fn new(whole: &'a Field, warp: &Warp, leaf: Cell) -> Self {
+        let centre = warp.world(grid_point(leaf) + f64::from(LEAF) / 2.0);
+        // Half the diagonal, and two cells for vertices that slide out of the leaf.
+        let radius = warp.cell * (f64::from(LEAF) * 3f64.sqrt() / 2.0 + 2.0);
+        Self { whole, local: whole.near(centre, radius), centre, radius }
+    }
+
+    fn field_at(&self, point: DVec3) -> &Field {
+        if (point - self.centre).length() < self.radius { &self.local } else { self.whole }
+    }
 }
 
 /// Meshes the zero level of a field with cells of `cell` metres, finer under the lenses.
 pub(super) fn mesh(field: &Field, cell: f64, lenses: &[Lens]) -> Mesh {
     let warp = Warp::new(cell, lenses);
-    let nets: Vec<(Vec<NetVertex>, Vec<Crossing>)> =
-        leaves(field, &warp).par_iter().map(|&leaf| net_in_leaf(field, &warp, leaf)).collect();
-    let mut net: Vec<NetVertex> = Vec::new();
-    let mut crossings = Vec::new();
+    let leaves = leaves(field, &warp);
+    let regions: Vec<Region<'_>> = leaves.par_iter().map(|&leaf| Region::new(field, &warp, leaf)).collect();
+    let sheets = sheets_of_all_cases();
+    let nets: Vec<(Vec<NetVertex>, Vec<Crossing>)> = leaves
+        .par_iter()
+        .enumerate()
+        .map(|(i, &leaf)| net_in_leaf(&regions[i].local, &warp, &sheets, leaf, i))
+        .collect();
+    let (mut net, mut crossings) = (Vec::new(), Vec::new());
     for (vertices, edges) in nets {
         net.extend(vertices);
         crossings.extend(edges);
     }
-    net.sort_by_key(|v| (v.cell, v.corners));
+    net.sort_by_key(|v| (v.cell, v.sheet));
     let quads: Vec<[u32; 4]> = crossings.iter().filter_map(|edge| edge.quad(&net)).collect();
-    let mut vertices: Vec<DVec3> = net.iter().map(|v| v.position).collect();
-    relax(field, &mut vertices, &quads);
-    Mesh { faces: split(&vertices, &quads), vertices }
+    let vertices = relaxed(&regions, &net, &quads);
+    let part = |(vertex, &position): (&NetVertex, &DVec3)| {
+        regions[vertex.leaf].field_at(position).nearest_part(position)
+    };
+    Mesh {
+        parts: net.par_iter().zip(&vertices).map(part).collect(),
+        faces: split(&vertices, &quads),
+        vertices,
+    }
 }
 
 /// Octree leaves that may hold surface, in a fixed order.
@@ -155,11 +192,10 @@ impl Crossing {
             let mut cell = self.lower;
             cell[u] -= back_u;
             cell[v] -= back_v;
-            let inside_end = i32::from(!self.lower_inside);
-            let corner = (inside_end << self.axis) | (back_u << u) | (back_v << v);
+            let crossed = edge(self.axis, back_u as usize, back_v as usize);
             let first = net.partition_point(|n| n.cell < cell);
-            let here = net[first..].iter().take_while(|n| n.cell == cell);
-            let group = here.into_iter().position(|n| n.corners >> corner & 1 == 1)?;
+            let mut here = net[first..].iter().take_while(|n| n.cell == cell);
+            let group = here.position(|n| n.sheet >> crossed & 1 == 1)?;
             quad[slot] = (first + group) as u32;
         }
         if !self.lower_inside {
@@ -169,7 +205,13 @@ impl Crossing {
     }
 }
 
-fn net_in_leaf(field: &Field, warp: &Warp, leaf: Cell) -> (Vec<NetVertex>, Vec<Crossing>) {
+fn net_in_leaf(
+    field: &Field,
+    warp: &Warp,
+    sheets: &[Vec<u16>],
+    leaf: Cell,
+    leaf_index: usize,
+) -> (Vec<NetVertex>, Vec<Crossing>) {
     let index = |p: [usize; 3]| p[0] + SIDE * (p[1] + SIDE * p[2]);
     let positions = |i: usize| [i % SIDE, i / SIDE % SIDE, i / (SIDE * SIDE)];
     let global = |p: [usize; 3]| -> Cell { std::array::from_fn(|axis| leaf[axis] + p[axis] as i32) };
@@ -183,9 +225,9 @@ fn net_in_leaf(field: &Field, warp: &Warp, leaf: Cell) -> (Vec<NetVertex>, Vec<C
         if inside == 0 || inside == u8::MAX {
             continue;
         }
-        for group in inside_groups(inside) {
-            let position = warp.world(grid_point(global(cell)) + mean_crossing(&corners, group, inside));
-            vertices.push(NetVertex { cell: global(cell), corners: group, position });
+        for &sheet in &sheets[usize::from(inside)] {
+            let position = warp.world(grid_point(global(cell)) + mean_crossing(&corners, sheet));
+            vertices.push(NetVertex { cell: global(cell), sheet, leaf: leaf_index, position });
         }
         let lower_inside = inside & 1 == 1;
         for axis in (0..3).filter(|axis| (inside >> (1 << axis) & 1 == 1) != lower_inside) {
@@ -195,67 +237,31 @@ fn net_in_leaf(field: &Field, warp: &Warp, leaf: Cell) -> (Vec<NetVertex>, Vec<C
     (vertices, crossings)
 }
 
-/// Inside corners connected by cell edges: two sheets that pass through one cell get a vertex each.
-fn inside_groups(inside: u8) -> Vec<u8> {
-    let mut left = inside;
-    let mut groups = Vec::new();
-    while left != 0 {
-        let mut group = left & left.wrapping_neg();
-        loop {
-            let neighbours = (group & 0x55) << 1
-                | (group & 0xaa) >> 1
-                | (group & 0x33) << 2
-                | (group & 0xcc) >> 2
-                | group << 4
-                | group >> 4;
-            let grown = group | (neighbours & inside);
-            if grown == group {
-                break;
-            }
-            group = grown;
-        }
-        groups.push(group);
-        left &= !group;
-    }
-    groups
-}
-
-/// Mean of the zero crossings on the cell's edges that leave a group, relative to the cell's lower corner.
-fn mean_crossing(corners: &[f64; 8], group: u8, inside: u8) -> DVec3 {
-    let at = |c: usize| DVec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64);
-    let (mut sum, mut count) = (DVec3::ZERO, 0.0);
-    for from in (0..8).filter(|c| group >> c & 1 == 1) {
-        for to in [from ^ 1, from ^ 2, from ^ 4].into_iter().filter(|c| inside >> c & 1 == 0) {
-            let t = corners[from] / (corners[from] - corners[to]);
-            sum += at(from).lerp(at(to), t);
-            count += 1.0;
-        }
-    }
-    sum / count
-}
-
 const RELAXATIONS: usize = 12;
 
-/// Moves vertices towards the mean of their neighbours along the surface, and back onto it by Newton steps.
-fn relax(field: &Field, vertices: &mut Vec<DVec3>, quads: &[[u32; 4]]) {
-    let neighbours = quad_neighbours(vertices.len(), quads);
+/// Vertices moved towards the mean of their neighbours along the surface, and back onto it by Newton steps: one per round,
+/// and two at the end.
+fn relaxed(regions: &[Region<'_>], net: &[NetVertex], quads: &[[u32; 4]]) -> Vec<DVec3> {
+    let neighbours = quad_neighbours(net.len(), quads);
+    let project = |i: usize, position: DVec3| {
+        let here = regions[net[i].leaf].field_at(position).sample(position);
+        let slope = here.gradient.length_squared();
+        let step = if slope > 1e-2 { here.gradient * (here.distance / slope) } else { DVec3::ZERO };
+        (position - step, here.gradient.normalize_or_zero())
+    };
+    let mut state: Vec<(DVec3, DVec3)> =
+        net.par_iter().enumerate().map(|(i, vertex)| project(i, vertex.position)).collect();
     for _ in 0..RELAXATIONS {
-        let moved = |(&vertex, around): (&DVec3, &Vec<u32>)| {
-            let mean = around.iter().map(|&i| vertices[i as usize]).sum::<DVec3>() / around.len() as f64;
-            let normal = field.sample(vertex).gradient.normalize_or_zero();
+        let moved = |(i, around): (usize, &Vec<u32>)| {
+            let (vertex, normal) = state[i];
+            let mean = around.iter().map(|&k| state[k as usize].0).sum::<DVec3>() / around.len() as f64;
             let step = (mean - vertex) * 0.6;
-            let mut position = vertex + step - normal * step.dot(normal);
-            for _ in 0..2 {
-                let here = field.sample(position);
-                let slope = here.gradient.length_squared();
-                if slope > 1e-2 {
-                    position -= here.gradient * (here.distance / slope);
-                }
-            }
-            position
+            project(i, vertex + step - normal * step.dot(normal))
         };
-        *vertices = vertices.par_iter().zip(&neighbours).map(moved).collect();
+        state = neighbours.par_iter().enumerate().map(moved).collect();
     }
+    let polished = |(i, &(vertex, _)): (usize, &(DVec3, DVec3))| project(i, project(i, vertex).0).0;
+    state.par_iter().enumerate().map(polished).collect()
 }
 
 fn quad_neighbours(count: usize, quads: &[[u32; 4]]) -> Vec<Vec<u32>> {

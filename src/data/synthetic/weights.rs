@@ -133,6 +133,10 @@ fn finger_gates(
     Some(gates)
 }
 
+/// Rounds of averaging over the mesh: transitions between fingers are narrower than their web, and this widens them to
+/// several edges along the surface.
+const SMOOTHINGS: usize = 3;
+
 /// Weights of every vertex: at most [`MAX_INFLUENCES`] joints, summing to one.
 ///
 /// # Errors
@@ -141,12 +145,41 @@ pub(super) fn weigh(
     joints: &Joints,
     claims: &[Claim],
     vertices: &[DVec3],
+    faces: &[[u32; 3]],
 ) -> Result<SkinWeights, SceneError> {
-    let rows = vertices.iter().map(|&vertex| row(joints, claims, vertex));
-    SkinWeights::from_rows(rows, joints.positions.len())
+    let mut rows: Vec<Vec<f64>> = vertices.iter().map(|&vertex| claimed(joints, claims, vertex)).collect();
+    let mut neighbours = vec![Vec::new(); vertices.len()];
+    for face in faces {
+        // Each edge of a closed mesh is seen once in this direction.
+        (0..3).for_each(|k| neighbours[face[k] as usize].push(face[(k + 1) % 3] as usize));
+    }
+    for _ in 0..SMOOTHINGS {
+        rows = rows.iter().zip(&neighbours).map(|(row, around)| smoothed(&rows, row, around)).collect();
+    }
+    SkinWeights::from_rows(rows.iter().map(|row| strongest(row)), joints.positions.len())
 }
 
-fn row(joints: &Joints, claims: &[Claim], vertex: DVec3) -> Vec<(usize, f32)> {
+/// Half of a row and half of the mean of its neighbours.
+fn smoothed(rows: &[Vec<f64>], row: &[f64], around: &[usize]) -> Vec<f64> {
+    let share = 0.5 / around.len() as f64;
+    let mut sum: Vec<f64> = row.iter().map(|w| 0.5 * w).collect();
+    for &neighbour in around {
+        sum.iter_mut().zip(&rows[neighbour]).for_each(|(s, w)| *s += share * w);
+    }
+    sum
+}
+
+/// The largest weights of a row, scaled to a sum of one.
+fn strongest(row: &[f64]) -> Vec<(usize, f32)> {
+    let mut row: Vec<(usize, f64)> = row.iter().copied().enumerate().filter(|h| h.1 > 1e-4).collect();
+    row.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    row.truncate(MAX_INFLUENCES);
+    let sum: f64 = row.iter().map(|r| r.1).sum();
+    row.into_iter().map(|(joint, weight)| (joint, (weight / sum) as f32)).collect()
+}
+
+/// The share of every joint at a point of the rest pose.
+fn claimed(joints: &Joints, claims: &[Claim], vertex: DVec3) -> Vec<f64> {
     let mut held = vec![0.0f64; joints.positions.len()];
     held[0] = 1.0;
     // Parents come before children; siblings claim at once, so that left and right are treated alike.
@@ -165,9 +198,5 @@ fn row(joints: &Joints, claims: &[Claim], vertex: DVec3) -> Vec<(usize, f32)> {
         }
         held[parent] = available * (1.0 - claimed).max(0.0);
     }
-    let mut row: Vec<(usize, f64)> = held.into_iter().enumerate().filter(|h| h.1 > 1e-4).collect();
-    row.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    row.truncate(MAX_INFLUENCES);
-    let sum: f64 = row.iter().map(|r| r.1).sum();
-    row.into_iter().map(|(joint, weight)| (joint, (weight / sum) as f32)).collect()
+    held
 }
