@@ -81,23 +81,11 @@ fn lane_kernel<const N: usize>(c: &mut Criterion) {
     let mut group = c.benchmark_group(format!("lanes/{N}"));
     group.throughput(Throughput::Elements(COUNT as u64));
     let blends = blends::<N>(4);
-    let run = || {
-        for blend in &blends {
-            black_box(lanes::from_blends(black_box(blend), &[1.0; N]));
-        }
-    };
-    group.bench_function("baseline", |b| b.iter(run));
-    let arch = pulp::Arch::new();
-    group.bench_function("dispatched", |b| {
+    group.bench_function("from_blends", |b| {
         b.iter(|| {
-            arch.dispatch(
-                #[inline(always)]
-                || {
-                    for blend in &blends {
-                        black_box(lanes::from_blends(black_box(blend), &[1.0; N]));
-                    }
-                },
-            );
+            for blend in &blends {
+                black_box(lanes::from_blends(black_box(blend), &[1.0; N]));
+            }
         });
     });
 }
@@ -114,20 +102,6 @@ fn sh_rotation(c: &mut Criterion) {
                 for (coefficients, &q) in black_box(&mut sh).chunks_exact_mut(16).zip(&quats) {
                     sh::Rotation::from_unit_quaternion(q, degree).apply(coefficients);
                 }
-            });
-        });
-        let arch = pulp::Arch::new();
-        group.bench_function(BenchmarkId::new("rotate_dispatched", degree), |b| {
-            b.iter(|| {
-                let sh = black_box(&mut sh);
-                arch.dispatch(
-                    #[inline(always)]
-                    || {
-                        for (coefficients, &q) in sh.chunks_exact_mut(16).zip(&quats) {
-                            sh::Rotation::from_unit_quaternion(q, degree).apply(coefficients);
-                        }
-                    },
-                );
             });
         });
     }

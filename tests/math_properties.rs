@@ -6,6 +6,7 @@ use skinsplat::math::average::{self, Solver, Start, average, average_rotation, l
 use skinsplat::math::dual_quaternion::{self, DualQuaternion};
 use skinsplat::math::rotation::{self, SignPolicy, angle_between, quaternion_to_matrix};
 use skinsplat::math::{Matrix3, Quaternion, matrix3, sh};
+use std::f64::consts::PI;
 
 const EXACT: [Solver; 3] = [Solver::ClosedForm, Solver::Eigen, Solver::Polar];
 
@@ -203,7 +204,7 @@ proptest! {
     }
 
     #[test]
-    fn angles_are_accurate(axis in unit(), angle in prop_oneof![1e-12..1e-3_f64, 0.0..3.14_f64, 3.1415..3.14159_f64], at in unit()) {
+    fn angles_are_accurate(axis in unit(), angle in prop_oneof![1e-12..1e-3_f64, 0.0..PI, PI - 1e-4..PI], at in unit()) {
         let axis = axis_of(axis);
         prop_assume!(axis.is_some());
         let [x, y, z] = axis.unwrap().map(|c| c * (angle / 2.0).sin());

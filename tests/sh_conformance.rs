@@ -1,38 +1,24 @@
 //! Spherical harmonics against reference values: `fixtures/sh`, `fixtures/goldens`.
 #![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::print_stdout, reason = "reports the worst errors under --nocapture")]
 
 mod support;
+#[path = "support/values.rs"]
+mod values;
 
 use serde_json::Value;
 use skinsplat::math::{Real, matrix3, sh};
 use support::json;
-
-fn numbers(value: &Value) -> Vec<f64> {
-    match value {
-        Value::Array(items) => items.iter().flat_map(numbers).collect(),
-        number => vec![number.as_f64().unwrap()],
-    }
-}
+use values::{difference, matrix, numbers};
 
 fn triples<T: Real>(value: &Value) -> Vec<[T; 3]> {
     numbers(value).chunks_exact(3).map(|c| [c[0], c[1], c[2]].map(T::from_f64)).collect()
 }
 
-fn matrix<T: Real>(value: &Value) -> [[T; 3]; 3] {
-    triples(value).try_into().unwrap()
-}
-
-/// The largest absolute difference; both sides must have the same length.
-fn worst<T: Real>(found: impl IntoIterator<Item = T>, expected: &[f64]) -> f64 {
-    let found: Vec<f64> = found.into_iter().map(Real::to_f64).collect();
-    assert_eq!(found.len(), expected.len());
-    found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
-
 fn band_errors<T: Real>(rotation: &sh::Rotation<T>, case: &Value) -> f64 {
-    let d1 = worst(rotation.matrix::<3>().into_iter().flatten(), &numbers(&case["D1"]));
-    let d2 = worst(rotation.matrix::<5>().into_iter().flatten(), &numbers(&case["D2"]));
-    let d3 = worst(rotation.matrix::<7>().into_iter().flatten(), &numbers(&case["D3"]));
+    let d1 = difference(rotation.matrix::<3>().into_iter().flatten(), &case["D1"]);
+    let d2 = difference(rotation.matrix::<5>().into_iter().flatten(), &case["D2"]);
+    let d3 = difference(rotation.matrix::<7>().into_iter().flatten(), &case["D3"]);
     d1.max(d2).max(d3)
 }
 
@@ -54,10 +40,10 @@ fn rotation_errors<T: Real>() -> [f64; 3] {
         };
         let errors = [
             band_errors(&rotation, case),
-            worst(rotated.iter().copied().flatten(), &numbers(&case["sh_rotated_16x3"])),
-            worst(evaluate(&canonical, false), &numbers(&case["eval_canonical_dirs"]))
-                .max(worst(evaluate(&rotated, true), &numbers(&case["eval_rotated_at_R_dirs"])))
-                .max(worst(evaluate(&canonical, true), &numbers(&case["eval_unrotated_sh_at_R_dirs"]))),
+            difference(rotated.iter().copied().flatten(), &case["sh_rotated_16x3"]),
+            difference(evaluate(&canonical, false), &case["eval_canonical_dirs"])
+                .max(difference(evaluate(&rotated, true), &case["eval_rotated_at_R_dirs"]))
+                .max(difference(evaluate(&canonical, true), &case["eval_unrotated_sh_at_R_dirs"])),
         ];
         for (total, error) in worst_errors.iter_mut().zip(errors) {
             *total = total.max(error);
@@ -93,7 +79,7 @@ fn basis_error<T: Real>() -> f64 {
     let file = json("sh/sh_basis.json");
     let dirs = triples::<T>(&file["dirs"]);
     assert_eq!(dirs.len(), 36, "directions in sh_basis.json");
-    let full = worst(dirs.iter().flat_map(|&d| sh::basis(3, d)), &numbers(&file["basis_n_x16"]));
+    let full = difference(dirs.iter().flat_map(|&d| sh::basis(3, d)), &file["basis_n_x16"]);
     for &dir in &dirs {
         let all = sh::basis(3, dir);
         for degree in 0..3 {
@@ -124,6 +110,6 @@ fn golden_rotation() {
     rotation.apply(&mut coefficients);
     for (channel, factor) in [1.0, -1.0, 2.0].into_iter().enumerate() {
         let found = coefficients.iter().map(|c| c[channel] / factor);
-        assert!(worst(found, &numbers(&golden["coeffs_out"])) < 5e-14);
+        assert!(difference(found, &golden["coeffs_out"]) < 5e-14);
     }
 }

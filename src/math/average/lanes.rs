@@ -1,7 +1,7 @@
 //! Many averages at once: `N` Gaussians side by side, one per SIMD lane, structure of arrays.
 //!
-//! Branch-free `f32` code that the compiler turns into vector instructions of whatever width the caller is compiled
-//! for: the functions are always inlined, so that a caller inside `pulp::Arch::dispatch` gets AVX2 or AVX-512.
+//! Branch-free `f32` code that the compiler turns into vector instructions, always inlined so that it takes the vector
+//! width of its caller.
 //! A lane's result depends on that lane alone, bit for bit, not on its neighbours or on `N`.
 
 use super::squaring;
@@ -56,7 +56,8 @@ fn dominant<const N: usize>(mut a: [[f32; N]; 10]) -> Lanes<N> {
         let m = lane(&a, i);
         set_lane(&mut a, i, squaring::scaled(&m, 1.0 / squaring::trace(&m)));
     }
-    let mut settled = [false; N];
+    // As wide as the numbers beside it, so that it lives in the same kind of vector register.
+    let mut settled = [0_u32; N];
     for _ in 0..squaring::MAX_SQUARINGS {
         let mut open = 0;
         for i in 0..N {
@@ -64,10 +65,10 @@ fn dominant<const N: usize>(mut a: [[f32; N]; 10]) -> Lanes<N> {
             let next = squaring::square(&m);
             let trace = squaring::trace(&next);
             let next = squaring::scaled(&next, 1.0 / trace);
-            let keep = settled[i];
+            let keep = settled[i] != 0;
             set_lane(&mut a, i, from_fn(|k| if keep { m[k] } else { next[k] }));
-            settled[i] = keep | squaring::is_square_rank_one(trace, RANK_ONE);
-            open += u32::from(!settled[i]);
+            settled[i] |= u32::from(squaring::is_square_rank_one(trace, RANK_ONE));
+            open += 1 - settled[i];
         }
         if open == 0 {
             break;
@@ -77,13 +78,13 @@ fn dominant<const N: usize>(mut a: [[f32; N]; 10]) -> Lanes<N> {
     for i in 0..N {
         let [w, x, y, z] = squaring::largest_column(&lane(&a, i));
         let inverse = 1.0 / ((w * w + x * x) + (y * y + z * z)).sqrt();
-        let keep = settled[i];
+        let keep = settled[i] != 0;
         quats[0][i] = if keep { w * inverse } else { 1.0 };
         quats[1][i] = if keep { x * inverse } else { 0.0 };
         quats[2][i] = if keep { y * inverse } else { 0.0 };
         quats[3][i] = if keep { z * inverse } else { 0.0 };
     }
-    Lanes { quats, settled }
+    Lanes { quats, settled: settled.map(|mask| mask != 0) }
 }
 
 /// Lane `i` of a structure of arrays.

@@ -135,3 +135,32 @@ impl From<Solver> for String {
         solver.to_string()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_round_trip() {
+        let fixed = ["closed-form", "eigen", "polar", "nlerp", "squaring-4", "power-15"].map(str::to_owned);
+        let starts = Start::NAMES.iter().skip(1).map(|(_, name)| format!("power-7-{name}"));
+        for id in fixed.into_iter().chain(starts) {
+            let solver: Solver = id.parse().unwrap();
+            assert_eq!(solver.to_string(), id);
+            let json = serde_json::to_string(&solver).unwrap();
+            assert_eq!(json, format!("\"{id}\""));
+            assert_eq!(serde_json::from_str::<Solver>(&json).unwrap(), solver);
+        }
+        let default = Solver::Power { steps: 15, start: Start::Heaviest };
+        assert_eq!("power-15-heaviest".parse(), Ok(default));
+    }
+
+    #[test]
+    fn other_ids_are_refused_by_name() {
+        for id in ["", "Eigen", "power", "power-", "power-+1", "power-1-", "power-1-zero", "squaring-100001"]
+        {
+            let error = id.parse::<Solver>().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{id}`")), "{error}");
+        }
+    }
+}

@@ -58,7 +58,7 @@ pub(super) fn is_square_rank_one<T: Real>(trace_of_square: T, tolerance: T) -> b
     (T::ONE - trace_of_square).abs() <= tolerance
 }
 
-/// The column with the largest diagonal entry (the first of equals). Of a matrix q qᵀ this is ±|..| q with its largest
+/// The column with the largest diagonal entry (the first of equals). Of a matrix q qᵀ this is a multiple of q with its largest
 /// component positive; of any blend it is the un-normalised power step that PyTorch3D's matrix-to-quaternion takes.
 #[inline(always)]
 pub(super) fn largest_column<T: Real>(a: &Symmetric<T>) -> Quaternion<T> {
