@@ -183,6 +183,25 @@ fn haha_grows_with_its_triangle() {
 }
 
 #[test]
+fn joints_that_scale_do_not_change_the_average() {
+    let body = rig::body();
+    let at = rig::bent(&body, 45, 1.0);
+    let mut scaled = at.clone();
+    scaled.locals[0].scale = DVec3::splat(2.0);
+    let [plain, scaled] = [&at, &scaled].map(|pose| PosedBody::new(&body, pose).unwrap());
+    let avatar = rig::on_vertices(&body, 80, 46);
+    let bound = BoundAvatar::new(&avatar, &body).unwrap();
+    for rotation in ["closed-form", "eigen", "lbs-polar", "gram-schmidt-columns", "gram-schmidt-rows"] {
+        let spec = format!("quaternion-average+rotation={rotation}");
+        let [a, b] = [&plain, &scaled].map(|body| posed(&bound, body, &spec));
+        for (a, b) in a.rotations.as_ref().unwrap().iter().zip(b.rotations.as_ref().unwrap()) {
+            let angle = skinsplat::math::rotation::angle_between(a.map(f64::from), b.map(f64::from));
+            assert!(angle < 1e-5, "{rotation}: {angle:e}");
+        }
+    }
+}
+
+#[test]
 fn vertex_averages_are_averaged_again_over_the_face() {
     let body = rig::body();
     let posed_body = PosedBody::new(&body, &rig::bent(&body, 51, 1.0)).unwrap();
@@ -356,7 +375,7 @@ fn degree_0_colours_are_not_touched() {
     avatar.gaussians.sh.truncate(20);
     let bound = BoundAvatar::new(&avatar, &body).unwrap();
     let posed_body = PosedBody::new(&body, &rig::bent(&body, 96, 1.0)).unwrap();
-    for (_, colour) in ColourChoice::NAMED {
+    for colour in ColourChoice::ALL {
         let found = pose(&bound, &posed_body, &Strategy { colour, ..strategy("lbs") }).unwrap();
         assert!(matches!(found.sh, std::borrow::Cow::Borrowed(_)) && found.view_frames.is_none());
     }

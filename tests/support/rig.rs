@@ -127,7 +127,7 @@ pub(crate) fn on_faces(body: &RestBody, n: usize, seed: u64) -> Avatar {
 
 /// Every rotation choice with the presets' other choices, and every other choice with the presets' rotations.
 pub(crate) fn strategies() -> Vec<Strategy> {
-    let mut rotations: Vec<RotationChoice> = RotationChoice::NAMED.iter().map(|(_, r)| *r).collect();
+    let mut rotations: Vec<RotationChoice> = RotationChoice::NAMED.to_vec();
     for id in ["closed-form", "eigen", "polar", "power-15", "nlerp", "squaring-6", "vertex-average-eigen"] {
         rotations.push(id.parse().unwrap());
     }
@@ -139,8 +139,8 @@ pub(crate) fn strategies() -> Vec<Strategy> {
         all.push(Strategy { rotation, covariance: CovarianceChoice::Surfel, ..base });
     }
     for preset in PRESETS {
-        all.extend(ColourChoice::NAMED.map(|(_, colour)| Strategy { colour, ..preset.strategy }));
-        all.extend(CovarianceChoice::NAMED.map(|(_, covariance)| Strategy { covariance, ..preset.strategy }));
+        all.extend(ColourChoice::ALL.map(|colour| Strategy { colour, ..preset.strategy }));
+        all.extend(CovarianceChoice::ALL.map(|covariance| Strategy { covariance, ..preset.strategy }));
     }
     all
 }
