@@ -11,10 +11,10 @@ const RINGS: usize = 25;
 const SEGMENTS: usize = 24;
 
 /// Deterministic numbers in \[0, 1).
-pub struct Noise(pub u64);
+pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
-    pub fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -24,7 +24,7 @@ impl Noise {
     }
 }
 
-pub fn body() -> RestBody {
+pub(crate) fn body() -> RestBody {
     let mut noise = Noise(1);
     let mut positions = vec![DVec3::ZERO];
     for joint in 1..24 {
@@ -74,7 +74,7 @@ fn row(parent: usize, joint: usize, t: f64, noise: &mut Noise) -> Vec<(usize, f3
 }
 
 /// Joints bent by up to about a right angle.
-pub fn pose(body: &RestBody) -> Pose {
+pub(crate) fn pose(body: &RestBody) -> Pose {
     let mut noise = Noise(2);
     let angles: Vec<DVec3> =
         (0..24).map(|_| DVec3::new(noise.signed(), noise.signed(), noise.signed())).collect();
@@ -97,13 +97,13 @@ fn gaussians(means: Vec<Vec3>, degree: usize) -> Gaussians {
 }
 
 /// A Gaussian per vertex, in the order of the mesh.
-pub fn on_vertices(body: &RestBody, degree: usize) -> Avatar {
+pub(crate) fn on_vertices(body: &RestBody, degree: usize) -> Avatar {
     let means = body.vertices.iter().map(|v| v.as_vec3()).collect();
     Avatar { gaussians: gaussians(means, degree), binding: Binding::Vertex(body.weights.clone()) }
 }
 
 /// 100,000 face-bound Gaussians in no order, as densification leaves them.
-pub fn on_faces(body: &RestBody, degree: usize) -> Avatar {
+pub(crate) fn on_faces(body: &RestBody, degree: usize) -> Avatar {
     let mut noise = Noise(4);
     let mut binding = FaceBinding::default();
     for _ in 0..100_000 {
@@ -118,7 +118,7 @@ pub fn on_faces(body: &RestBody, degree: usize) -> Avatar {
 }
 
 /// 100,000 Gaussians with weights of their own near the surface, in no order.
-pub fn scattered(body: &RestBody, degree: usize) -> Avatar {
+pub(crate) fn scattered(body: &RestBody, degree: usize) -> Avatar {
     let mut noise = Noise(5);
     let (mut means, mut rows) = (Vec::new(), Vec::new());
     for _ in 0..100_000 {

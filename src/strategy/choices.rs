@@ -118,23 +118,23 @@ pub enum ClampChoice {
 const SOLVERS: &str = "closed-form, eigen, polar, nlerp, power-N[-START], squaring-N";
 
 impl RotationChoice {
-    /// The ids that take no parameter, with their meaning. The ids of [`Solver`] stand for
-    /// [`RotationChoice::QuaternionAverage`], and `vertex-average-` may be followed by one.
-    pub const NAMED: [(&'static str, Self); 14] = [
-        ("gram-schmidt-columns", Self::Lbs(LbsProjection::GramSchmidtColumns)),
-        ("gram-schmidt-rows", Self::Lbs(LbsProjection::GramSchmidtRows)),
-        ("matrix-to-quaternion-raw", Self::Lbs(LbsProjection::MatrixToQuaternionRaw)),
-        ("matrix-to-quaternion", Self::Lbs(LbsProjection::MatrixToQuaternion)),
-        ("lbs-polar", Self::Lbs(LbsProjection::Polar)),
-        ("face-splattingavatar", Self::FaceFrame(FaceFrame::SplattingAvatar)),
-        ("face-ihuman", Self::FaceFrame(FaceFrame::IHuman)),
-        ("face-haha", Self::FaceFrame(FaceFrame::Haha)),
-        ("face-haha-scaled", Self::FaceFrame(FaceFrame::HahaScaled)),
-        ("vertex-average", Self::VertexAverage(Solver::ClosedForm)),
-        ("vertex-quaternions-w", Self::VertexQuaternions(SignPolicy::NonNegativeW)),
-        ("vertex-quaternions-largest", Self::VertexQuaternions(SignPolicy::LargestPositive)),
-        ("vertex-quaternions-align", Self::VertexQuaternions(SignPolicy::AlignToFirst)),
-        ("dual-quaternion", Self::DualQuaternion),
+    /// The choices whose id takes no parameter. The ids of [`Solver`] stand for [`RotationChoice::QuaternionAverage`],
+    /// and `vertex-average-` may be followed by one.
+    pub const NAMED: [Self; 14] = [
+        Self::Lbs(LbsProjection::GramSchmidtColumns),
+        Self::Lbs(LbsProjection::GramSchmidtRows),
+        Self::Lbs(LbsProjection::MatrixToQuaternionRaw),
+        Self::Lbs(LbsProjection::MatrixToQuaternion),
+        Self::Lbs(LbsProjection::Polar),
+        Self::FaceFrame(FaceFrame::SplattingAvatar),
+        Self::FaceFrame(FaceFrame::IHuman),
+        Self::FaceFrame(FaceFrame::Haha),
+        Self::FaceFrame(FaceFrame::HahaScaled),
+        Self::VertexAverage(Solver::ClosedForm),
+        Self::VertexQuaternions(SignPolicy::NonNegativeW),
+        Self::VertexQuaternions(SignPolicy::LargestPositive),
+        Self::VertexQuaternions(SignPolicy::AlignToFirst),
+        Self::DualQuaternion,
     ];
 
     /// True if R is read from the posed mesh or from the face of the Gaussian.
@@ -148,12 +148,24 @@ impl RotationChoice {
 
 impl fmt::Display for RotationChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (Self::NAMED.iter().find(|(_, choice)| choice == self), self) {
-            (Some((id, _)), _) => f.write_str(id),
-            (None, Self::QuaternionAverage(solver)) => write!(f, "{solver}"),
-            (None, Self::VertexAverage(solver)) => write!(f, "vertex-average-{solver}"),
-            (None, _) => unreachable!("every choice without a solver is in NAMED"),
-        }
+        f.write_str(match self {
+            Self::Lbs(LbsProjection::GramSchmidtColumns) => "gram-schmidt-columns",
+            Self::Lbs(LbsProjection::GramSchmidtRows) => "gram-schmidt-rows",
+            Self::Lbs(LbsProjection::MatrixToQuaternionRaw) => "matrix-to-quaternion-raw",
+            Self::Lbs(LbsProjection::MatrixToQuaternion) => "matrix-to-quaternion",
+            Self::Lbs(LbsProjection::Polar) => "lbs-polar",
+            Self::FaceFrame(FaceFrame::SplattingAvatar) => "face-splattingavatar",
+            Self::FaceFrame(FaceFrame::IHuman) => "face-ihuman",
+            Self::FaceFrame(FaceFrame::Haha) => "face-haha",
+            Self::FaceFrame(FaceFrame::HahaScaled) => "face-haha-scaled",
+            Self::QuaternionAverage(solver) => return write!(f, "{solver}"),
+            Self::VertexAverage(Solver::ClosedForm) => "vertex-average",
+            Self::VertexAverage(solver) => return write!(f, "vertex-average-{solver}"),
+            Self::VertexQuaternions(SignPolicy::NonNegativeW) => "vertex-quaternions-w",
+            Self::VertexQuaternions(SignPolicy::LargestPositive) => "vertex-quaternions-largest",
+            Self::VertexQuaternions(SignPolicy::AlignToFirst) => "vertex-quaternions-align",
+            Self::DualQuaternion => "dual-quaternion",
+        })
     }
 }
 
@@ -161,11 +173,11 @@ impl FromStr for RotationChoice {
     type Err = StrategyError;
 
     fn from_str(id: &str) -> Result<Self, StrategyError> {
-        if let Some((_, choice)) = Self::NAMED.iter().find(|(known, _)| *known == id) {
+        if let Some(choice) = Self::NAMED.iter().find(|choice| choice.to_string() == id) {
             return Ok(*choice);
         }
         let unknown = || {
-            let named = Self::NAMED.map(|(known, _)| known).join(", ");
+            let named = Self::NAMED.map(|choice| choice.to_string()).join(", ");
             let expected = format!("{SOLVERS}, vertex-average-SOLVER, {named}");
             StrategyError::UnknownId { axis: "rotation", id: id.to_owned(), expected }
         };
@@ -190,12 +202,12 @@ impl From<RotationChoice> for String {
     }
 }
 
-/// `FromStr` and `Display` from a table of ids.
+/// The list of choices, `FromStr` and `Display` from a table of ids.
 macro_rules! named {
     ($choice:ty, $axis:literal, [$(($id:literal, $variant:ident)),+ $(,)?]) => {
         impl $choice {
-            /// Every choice with its id.
-            pub const NAMED: [(&'static str, Self); [$($id),+].len()] = [$(($id, Self::$variant)),+];
+            /// Every choice.
+            pub const ALL: [Self; [$($id),+].len()] = [$(Self::$variant),+];
         }
 
         impl fmt::Display for $choice {
@@ -208,12 +220,14 @@ macro_rules! named {
             type Err = StrategyError;
 
             fn from_str(id: &str) -> Result<Self, StrategyError> {
-                let known = Self::NAMED.iter().find(|(known, _)| *known == id);
-                known.map(|(_, choice)| *choice).ok_or_else(|| StrategyError::UnknownId {
-                    axis: $axis,
-                    id: id.to_owned(),
-                    expected: Self::NAMED.map(|(known, _)| known).join(", "),
-                })
+                match id {
+                    $($id => Ok(Self::$variant),)+
+                    _ => Err(StrategyError::UnknownId {
+                        axis: $axis,
+                        id: id.to_owned(),
+                        expected: [$($id),+].join(", "),
+                    }),
+                }
             }
         }
     };

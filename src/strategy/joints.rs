@@ -6,8 +6,9 @@ use crate::math::{Matrix3, Quaternion};
 use crate::scene::PosedBody;
 use glam::DMat3;
 
-/// How far the linear part of a joint may be from its rotation to count as rigid.
-const RIGID: f64 = 1e-9;
+/// How far the entries of a joint's linear part may be from its rotation's to count as rigid: what f32 quaternions of a
+/// file leave.
+const RIGID: f64 = 1e-6;
 
 /// One entry per joint.
 pub(super) struct Joints {

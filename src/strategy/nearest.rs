@@ -7,6 +7,9 @@ use glam::DVec3;
 /// Faces per leaf.
 const LEAF: usize = 4;
 
+/// Nodes that can wait at once: one a level, and halving 2³² faces takes 32 levels.
+const DEPTH: usize = 64;
+
 /// A face and the barycentric coordinates of a point on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
@@ -51,21 +54,26 @@ impl<'a> NearestFace<'a> {
     /// The point of the mesh nearest to `point`. Of faces at exactly the same distance the lowest index wins.
     pub fn nearest(&self, point: DVec3) -> SurfacePoint {
         let mut best = (f64::INFINITY, SurfacePoint { face: u32::MAX, barycentric: [1.0, 0.0, 0.0] });
-        let mut stack = vec![0usize];
-        while let Some(index) = stack.pop() {
-            let node = &self.nodes[index];
-            if box_distance(node, point) > best.0 {
+        let mut waiting = [(0.0, 0u32); DEPTH];
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let (distance, index) = waiting[count];
+            if distance > best.0 {
                 continue;
             }
+            let node = &self.nodes[index as usize];
             if node.second_child == 0 {
                 for &face in &self.order[node.start as usize..node.end as usize] {
                     self.improve(point, face, &mut best);
                 }
                 continue;
             }
-            let (a, b) = (index + 1, node.second_child as usize);
-            let a_first = box_distance(&self.nodes[a], point) <= box_distance(&self.nodes[b], point);
-            stack.extend(if a_first { [b, a] } else { [a, b] });
+            let child = |index: u32| (box_distance(&self.nodes[index as usize], point), index);
+            let (a, b) = (child(index + 1), child(node.second_child));
+            let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+            (waiting[count], waiting[count + 1]) = (far, near);
+            count += 2;
         }
         best.1
     }

@@ -20,12 +20,23 @@ use std::borrow::Cow;
 ///
 /// Means: Eq. 6 (LBS) for Gaussians with weights of their own, except under dual-quaternion blending and HAHA's scaled
 /// frames; `Σ b_k v_k + unit(Σ b_k n_k) offset` on the posed mesh for face-bound ones, under every strategy but the
-/// latter. What a strategy does not need is not computed. The result does not depend on the number of threads.
+/// latter. What a strategy does not need is not computed. The result is the same, bit
+/// for bit, for any number of threads and any width of vector instructions.
 ///
 /// # Errors
 /// [`StrategyError::NoFaces`] if the strategy reads faces and the body has none, [`StrategyError::OtherBody`] if the
 /// avatar was bound to a body of other counts.
 pub fn pose<'a>(
+    bound: &'a BoundAvatar,
+    body: &PosedBody<'_>,
+    strategy: &Strategy,
+) -> Result<Posed<'a>, StrategyError> {
+    pose_on(pulp::Arch::new(), bound, body, strategy)
+}
+
+/// [`pose`] with the instructions of one kind of processor.
+fn pose_on<'a>(
+    arch: pulp::Arch,
     bound: &'a BoundAvatar,
     body: &PosedBody<'_>,
     strategy: &Strategy,
@@ -45,7 +56,7 @@ pub fn pose<'a>(
     } else {
         Source::Identity
     };
-    let frame = Frame { bound, body, strategy, joints, source, arch: pulp::Arch::new() };
+    let frame = Frame { bound, body, strategy, joints, source, arch };
     let produces = Produces::of(strategy, bound);
     let n = bound.len();
     let mut means = vec![Vec3::ZERO; n];
@@ -294,6 +305,55 @@ impl PoseChunk<'_, '_> {
         for lane in 0..LANES {
             let growth = self.frame.growth(self.start + usize::from(block.index[lane]));
             scales.iter_mut().for_each(|axis| axis[lane] *= growth);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::PRESETS;
+    use super::*;
+    use crate::scene::{Avatar, Binding, Gaussians, Pose, RestBody, Skeleton, SkinWeights};
+    use glam::DVec3;
+
+    /// A fan of triangles over a chain of six joints, and a Gaussian per vertex that hangs on one to six of them.
+    fn fan() -> (RestBody, Avatar) {
+        let chain: Vec<DVec3> = (0..6).map(|j| DVec3::X * f64::from(j)).collect();
+        let parents = (0..6).map(|j: usize| j.checked_sub(1)).collect();
+        let skeleton = Skeleton::from_joint_positions(vec![String::new(); 6], parents, &chain).unwrap();
+        let wave = |i: u32, k: u32| f64::from(i * k + k).sin();
+        let vertices: Vec<DVec3> = (0..90).map(|i| DVec3::new(wave(i, 3), wave(i, 5), wave(i, 7))).collect();
+        let row = |i: usize| {
+            let sum = (0..=i % 6).map(|j| 1.0 + j as f32).sum::<f32>();
+            (0..=i % 6).map(move |j| (j, (1.0 + j as f32) / sum))
+        };
+        let weights = SkinWeights::from_rows((0..90).map(row), 6).unwrap();
+        let gaussians = Gaussians {
+            means: vertices.iter().map(|v| v.as_vec3()).collect(),
+            rotations: (0..90)
+                .map(|i| [wave(i, 2) as f32, wave(i, 4) as f32, wave(i, 6) as f32, 0.3])
+                .collect(),
+            log_scales: vertices.iter().map(|v| v.as_vec3() - 3.0).collect(),
+            opacity_logits: vec![0.0; 90],
+            sh_degree: 3,
+            sh: (0..90 * 16).map(|i| [wave(i, 11) as f32, 0.5, wave(i, 13) as f32]).collect(),
+        };
+        let binding = Binding::Vertex(weights.clone());
+        let faces = (1..89).map(|i| [0, i, i + 1]).collect();
+        let body = RestBody { skeleton, vertices, faces, weights, uv: None, pose_directions: Vec::new() };
+        (body, Avatar { gaussians, binding })
+    }
+
+    #[test]
+    fn every_processor_computes_the_same_bits() {
+        let (body, avatar) = fan();
+        let bound = BoundAvatar::new(&avatar, &body).unwrap();
+        let angles: Vec<DVec3> = (0..6).map(|j| DVec3::new(0.3, f64::from(j).sin(), -0.5)).collect();
+        let at = Pose::from_axis_angles(&body.skeleton, &angles, DVec3::Z);
+        let body = PosedBody::new(&body, &at).unwrap();
+        for preset in PRESETS {
+            let narrow = pose_on(pulp::Arch::Scalar, &bound, &body, &preset.strategy).unwrap();
+            assert_eq!(narrow, pose(&bound, &body, &preset.strategy).unwrap(), "{}", preset.id);
         }
     }
 }

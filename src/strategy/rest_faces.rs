@@ -38,11 +38,12 @@ impl RestFaces {
         }
     }
 
-    /// The rest frames that a kind of frame turns away from.
-    pub(crate) fn frames(&self, kind: FaceFrame) -> &[Option<Frame>] {
+    /// The rest frames that a kind of frame turns away from, and the kind that they were built as. iHuman's frame is
+    /// SplattingAvatar's times a constant, which cancels between two poses.
+    pub(crate) fn frames(&self, kind: FaceFrame) -> (FaceFrame, &[Option<Frame>]) {
         match kind {
-            FaceFrame::SplattingAvatar | FaceFrame::IHuman => &self.edge01,
-            FaceFrame::Haha | FaceFrame::HahaScaled => &self.edge12,
+            FaceFrame::SplattingAvatar | FaceFrame::IHuman => (FaceFrame::SplattingAvatar, &self.edge01),
+            FaceFrame::Haha | FaceFrame::HahaScaled => (FaceFrame::Haha, &self.edge12),
         }
     }
 }

@@ -84,15 +84,15 @@ mod tests {
     #[test]
     fn every_combination_round_trips() {
         let solvers = ["closed-form", "eigen", "polar", "power-15", "power-3", "nlerp"];
-        let mut rotations: Vec<RotationChoice> = RotationChoice::NAMED.iter().map(|(_, r)| *r).collect();
+        let mut rotations: Vec<RotationChoice> = RotationChoice::NAMED.to_vec();
         for solver in solvers {
             rotations.push(solver.parse().unwrap());
             rotations.push(format!("vertex-average-{solver}").parse().unwrap());
         }
         for rotation in rotations {
-            for (_, covariance) in CovarianceChoice::NAMED {
-                for (_, colour) in ColourChoice::NAMED {
-                    for (_, clamp) in ClampChoice::NAMED {
+            for covariance in CovarianceChoice::ALL {
+                for colour in ColourChoice::ALL {
+                    for clamp in ClampChoice::ALL {
                         let strategy = Strategy { rotation, covariance, colour, clamp };
                         assert_eq!(strategy.to_string().parse::<Strategy>().unwrap(), strategy, "{strategy}");
                         let json = serde_json::to_string(&strategy).unwrap();
@@ -107,14 +107,14 @@ mod tests {
 
     #[test]
     fn serde_names_are_the_ids() {
-        for (id, choice) in CovarianceChoice::NAMED {
-            assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{id}\""));
+        for choice in CovarianceChoice::ALL {
+            assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{choice}\""));
         }
-        for (id, choice) in ColourChoice::NAMED {
-            assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{id}\""));
+        for choice in ColourChoice::ALL {
+            assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{choice}\""));
         }
-        for (id, choice) in ClampChoice::NAMED {
-            assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{id}\""));
+        for choice in ClampChoice::ALL {
+            assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{choice}\""));
         }
     }
 

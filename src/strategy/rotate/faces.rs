@@ -57,7 +57,7 @@ fn face_turns(
     needed: impl Fn(usize) -> bool + Sync,
 ) -> Vec<Option<Quaternion<f32>>> {
     let vertices = &body.mesh().vertices;
-    let rest = surface.faces.frames(kind);
+    let (kind, rest) = surface.faces.frames(kind);
     let turn = |face: usize| {
         if !needed(face) {
             return None;
