@@ -39,6 +39,8 @@ pub(super) trait Lanes: Copy {
     /// `0 <= a <= limit` for positive limits (−0 counts as negative).
     fn in_range(self, a: Self::F, limit: Self::F) -> Self::M;
     fn less(self, a: Self::F, b: Self::F) -> Self::M;
+    /// `a >= b`.
+    fn at_least(self, a: Self::F, b: Self::F) -> Self::M;
     fn both(self, a: Self::M, b: Self::M) -> Self::M;
     fn any(self, mask: Self::M) -> bool;
     /// `a` where the mask is set, else 0.
@@ -227,6 +229,10 @@ impl Lanes for Arrays {
     #[inline(always)]
     fn less(self, a: [f32; 16], b: [f32; 16]) -> [bool; 16] {
         zip(a, b, |a, b| a < b)
+    }
+    #[inline(always)]
+    fn at_least(self, a: [f32; 16], b: [f32; 16]) -> [bool; 16] {
+        zip(a, b, |a, b| a >= b)
     }
     #[inline(always)]
     fn both(self, a: [bool; 16], b: [bool; 16]) -> [bool; 16] {

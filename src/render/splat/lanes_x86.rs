@@ -96,6 +96,10 @@ impl Lanes for V4 {
         self.cmp_lt_f32x16(a, b)
     }
     #[inline(always)]
+    fn at_least(self, a: f32x16, b: f32x16) -> pulp::b16 {
+        self.cmp_ge_f32x16(a, b)
+    }
+    #[inline(always)]
     fn both(self, a: pulp::b16, b: pulp::b16) -> pulp::b16 {
         pulp::b16(a.0 & b.0)
     }
@@ -225,6 +229,10 @@ impl Lanes for V3 {
     #[inline(always)]
     fn less(self, a: Self::F, b: Self::F) -> Self::M {
         zip(a, b, |a, b| self.cmp_lt_f32x8(a, b))
+    }
+    #[inline(always)]
+    fn at_least(self, a: Self::F, b: Self::F) -> Self::M {
+        zip(a, b, |a, b| self.cmp_ge_f32x8(a, b))
     }
     #[inline(always)]
     fn both(self, a: Self::M, b: Self::M) -> Self::M {
