@@ -19,6 +19,8 @@ pub(super) trait Lanes: Copy {
     fn div(self, a: Self::F, b: Self::F) -> Self::F;
     /// `a b + c`, rounded once.
     fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// `a b + c`, rounded once, on four numbers.
+    fn mul_add_four(self, a: f32, b: &[f32; 4], c: [f32; 4]) -> [f32; 4];
     /// `c - a b`, rounded once.
     fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// `a` where `a < b`, else `b`.
@@ -179,6 +181,10 @@ impl Lanes for Arrays {
     #[inline(always)]
     fn mul_add(self, a: [f32; 16], b: [f32; 16], c: [f32; 16]) -> [f32; 16] {
         std::array::from_fn(|i| a[i].mul_add(b[i], c[i]))
+    }
+    #[inline(always)]
+    fn mul_add_four(self, a: f32, b: &[f32; 4], c: [f32; 4]) -> [f32; 4] {
+        std::array::from_fn(|i| a.mul_add(b[i], c[i]))
     }
     #[inline(always)]
     fn neg_mul_add(self, a: [f32; 16], b: [f32; 16], c: [f32; 16]) -> [f32; 16] {
