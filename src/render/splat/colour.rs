@@ -97,11 +97,11 @@ fn sum<const K: usize, L: Lanes>(l: L, coefficients: &[[f32; 3]], basis: impl Fn
     [r, g, b]
 }
 
-/// The clamp that follows; NaN becomes 0.
+/// The clamp that follows.
 #[inline(always)]
 pub(super) fn clamped(colour: [f32; 3], clamp: ColourClamp) -> [f32; 3] {
     match clamp {
         ColourClamp::NonNegative => each(colour, |c| c.max(0.0)),
-        ColourClamp::Unit => each(colour, |c| c.max(0.0).min(1.0)),
+        ColourClamp::Unit => each(colour, |c| c.clamp(0.0, 1.0)),
     }
 }
