@@ -99,7 +99,7 @@ impl Renderer {
 
     /// Number of Gaussians that reached the image of the last frame drawn.
     pub fn visible(&self) -> usize {
-        self.bins.iter().map(Bins::len).sum()
+        self.bins.iter().map(Bins::splats).sum()
     }
 
     /// Draws one frame.

@@ -85,8 +85,8 @@ impl DrawStrip<'_, '_> {
                 for (column, block) in blocks.iter_mut().enumerate() {
                     let list = segment.list(column);
                     if !list.is_empty() {
-                        let block = block.get_or_insert_with(|| Block::new(left + column * BLOCK));
-                        block.blend(l, top + band * BLOCK, list, &segment.splats);
+                        let corner = [left + column * BLOCK, top + band * BLOCK];
+                        block.get_or_insert_with(Block::new).blend(l, corner, list, &segment.splats);
                     }
                 }
                 clock.lap(Phase::Blend);
