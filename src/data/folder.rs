@@ -11,7 +11,7 @@
 //! Sequences named `train*` are for fitting, those named `test*` for evaluation.
 
 use super::poses::{self, PoseTrack};
-use super::{Error, Sequence, body, camera, error, npy};
+use super::{Capture, Error, Sequence, body, camera, error, npy};
 use super::{FrameRef, FrameSource};
 use crate::scene::{Body, Camera, RestBody};
 use serde::Deserialize;
@@ -26,18 +26,6 @@ pub struct Options {
     pub model: Option<PathBuf>,
     /// Displace the body by `gt_normal_offset.npy`. Off by default: an evaluation does not know the clothing.
     pub clothing: bool,
-}
-
-/// How a subject was captured, found by looking at the data.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Capture {
-    /// One camera (PeopleSnapshot, NeuMan).
-    Monocular,
-    /// Several cameras in some sequence (GalaBasketball).
-    MultiCamera,
-    /// One camera and a body with hands and face, 55 joints (X-Humans).
-    Expressive,
 }
 
 /// A person with training and test sequences.
@@ -68,7 +56,7 @@ impl Subject {
         let sequences = || train.iter().chain(&test);
         let cameras = sequences().map(|s| s.cameras.len()).max();
         let joints = sequences().map(|s| s.body.skeleton.num_joints()).max();
-        let capture = Capture::of(folder, cameras.zip(joints))?;
+        let capture = capture_of(folder, cameras.zip(joints))?;
         let id = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         Ok(Self { id, capture, train, test })
     }
@@ -105,21 +93,19 @@ pub fn inspect(folder: &Path) -> Result<Capture, Error> {
         let (more_cameras, more_joints) = (files.cameras()?.len(), files.poses()?.num_joints());
         most = Some((cameras.max(more_cameras), joints.max(more_joints)));
     }
-    Capture::of(folder, most)
+    capture_of(folder, most)
 }
 
-impl Capture {
-    /// From the largest numbers of cameras and joints of a subject's sequences.
-    fn of(folder: &Path, cameras_and_joints: Option<(usize, usize)>) -> Result<Self, Error> {
-        match cameras_and_joints {
-            None => {
-                let expected = "folders train* and test* with transforms.json";
-                Err(Error::invalid(folder, "sequences", "none", expected))
-            }
-            Some((2.., _)) => Ok(Self::MultiCamera),
-            Some((_, 55..)) => Ok(Self::Expressive),
-            Some(_) => Ok(Self::Monocular),
+/// From the largest numbers of cameras and joints of a subject's sequences.
+fn capture_of(folder: &Path, cameras_and_joints: Option<(usize, usize)>) -> Result<Capture, Error> {
+    match cameras_and_joints {
+        None => {
+            let expected = "folders train* and test* with transforms.json";
+            Err(Error::invalid(folder, "sequences", "none", expected))
         }
+        Some((2.., _)) => Ok(Capture::Multiview),
+        Some((_, 55..)) => Ok(Capture::Hands),
+        Some(_) => Ok(Capture::Monocular),
     }
 }
 

@@ -25,11 +25,7 @@ impl Dataset {
         let invalid = |e| Error::scene(Path::new(&format!("dataset {}, parameters", self.id)), e);
         let subject = |(id, parameters): (String, synthetic::Parameters)| {
             let made = synthetic::Subject::new(&parameters).map_err(invalid)?;
-            let capture = match parameters.capture {
-                synthetic::Capture::Monocular => super::Capture::Monocular,
-                synthetic::Capture::Multiview => super::Capture::MultiCamera,
-                synthetic::Capture::Hands => super::Capture::Expressive,
-            };
+            let capture = parameters.capture;
             Ok(Subject { id, capture, train: made.train(), test: made.test() })
         };
         synthetic::subjects(text).map_err(invalid)?.into_iter().map(subject).collect()

@@ -22,6 +22,7 @@
 pub mod atomic;
 pub mod body;
 pub mod camera;
+mod capture;
 mod digest;
 pub mod error;
 pub mod folder;
@@ -39,7 +40,8 @@ pub mod sequence;
 pub mod splatting_avatar;
 pub mod synthetic;
 
+pub use capture::Capture;
 pub use error::Error;
-pub use folder::{Capture, Subject};
+pub use folder::Subject;
 pub use registry::Registry;
 pub use sequence::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};

@@ -9,7 +9,8 @@
 //! ```
 //! The two pose files of a subject may hold different betas; each split keeps its own.
 
-use super::folder::{Capture, Models, Options, Subject};
+use super::Capture;
+use super::folder::{Models, Options, Subject};
 use super::{Error, FrameRef, FrameSource, Sequence, camera, poses};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

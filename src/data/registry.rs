@@ -1,8 +1,8 @@
 //! `datasets.toml`: which datasets exist, where they lie, under which licence.
 
-use super::folder::{self, Capture, Options, Subject};
+use super::folder::{self, Options, Subject};
 use super::peoplesnapshot::{self, Split};
-use super::{Error, error};
+use super::{Capture, Error, error};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

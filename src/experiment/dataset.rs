@@ -1,29 +1,7 @@
 //! What the planner knows about data: names, counts and digests, no pixels.
 
+use crate::data::Capture;
 use serde::{Deserialize, Serialize};
-
-/// How a subject was captured. A stand-in must be of the kind that the table's own data set is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Capture {
-    /// One camera, a moving subject (NeuMan, PeopleSnapshot).
-    Monocular,
-    /// Several calibrated cameras at once (GalaBasketball).
-    Multiview,
-    /// One camera and a rig with fingers, jaw and eyes: SMPL-X's 55 joints (X-Humans).
-    Hands,
-}
-
-impl Capture {
-    /// The kind as a phrase for captions.
-    pub fn describe(self) -> &'static str {
-        match self {
-            Self::Monocular => "monocular capture",
-            Self::Multiview => "multi-view capture",
-            Self::Hands => "monocular capture on a rig with fingers, jaw and eyes",
-        }
-    }
-}
 
 /// The part that a sequence plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

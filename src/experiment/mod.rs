@@ -22,7 +22,8 @@ mod shard;
 mod spec;
 mod validate;
 
-pub use dataset::{AvatarFile, Capture, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
+pub use crate::data::Capture;
+pub use dataset::{AvatarFile, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
 pub use embedded::EMBEDDED;
 pub use error::Error;
 pub use key::{CodeVersions, canonical_json, content_key};

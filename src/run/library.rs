@@ -64,18 +64,5 @@ fn describe_subject(subject: &Subject) -> Result<SubjectInfo, data::Error> {
         Ok(SequenceInfo { id: sequence.id.clone(), role, digest, frames })
     };
     let sequences = sequences.par_iter().map(describe).collect::<Result<_, data::Error>>()?;
-    Ok(SubjectInfo {
-        id: subject.id.clone(),
-        capture: capture(subject.capture),
-        sequences,
-        avatars: Vec::new(),
-    })
-}
-
-fn capture(capture: data::folder::Capture) -> crate::experiment::Capture {
-    match capture {
-        data::folder::Capture::Monocular => crate::experiment::Capture::Monocular,
-        data::folder::Capture::MultiCamera => crate::experiment::Capture::Multiview,
-        data::folder::Capture::Expressive => crate::experiment::Capture::Hands,
-    }
+    Ok(SubjectInfo { id: subject.id.clone(), capture: subject.capture, sequences, avatars: Vec::new() })
 }

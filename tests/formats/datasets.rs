@@ -30,7 +30,7 @@ fn the_committed_subjects_load_with_what_they_hold() {
     let expected = [
         (
             "multiview_ben",
-            Capture::MultiCamera,
+            Capture::Multiview,
             24,
             vec![("train", 18, 6, 3), ("test_novel_pose", 4, 2, 2), ("test_novel_view", 4, 2, 2)],
         ),
@@ -40,7 +40,7 @@ fn the_committed_subjects_load_with_what_they_hold() {
             24,
             vec![("train_casual", 8, 1, 8), ("test_squat", 3, 1, 3), ("test_twist", 3, 1, 3)],
         ),
-        ("xhands_ava", Capture::Expressive, 55, vec![("train_take1", 5, 1, 5), ("test_take2", 3, 1, 3)]),
+        ("xhands_ava", Capture::Hands, 55, vec![("train_take1", 5, 1, 5), ("test_take2", 3, 1, 3)]),
     ];
     for (name, capture, joints, sequences) in expected {
         let loaded = Subject::load(&subject(name), &Options::default()).unwrap();
@@ -115,9 +115,11 @@ fn truth_is_straight_colour_and_the_mask() {
     let (rgb, alpha) = frames::load_image(image).unwrap();
     assert_eq!((truth.rgb, Some(&truth.alpha)), (rgb, alpha.as_ref()), "mask and alpha are the same here");
     assert_eq!(frames::load_mask(mask).unwrap(), truth.alpha);
-    let digest = |s: &skinsplat::data::Sequence, i: usize| s.truth_digest(&s.frames[i]).unwrap();
-    assert_eq!(digest(&subject.test[0], 0).len(), 64);
-    assert_ne!(digest(&subject.test[0], 0), digest(&subject.test[0], 1));
+    let digest = |frames: &[usize]| subject.test[0].selected(frames).unwrap().digest().unwrap();
+    assert_eq!(digest(&[0]).len(), 64);
+    assert_eq!(digest(&[0]), digest(&[0]));
+    assert_ne!(digest(&[0]), digest(&[1]));
+    assert_eq!(subject.test[0].selected(&[99]).unwrap_err().field(), "frame");
     assert_eq!(subject.test[0].truth(99).unwrap_err().field(), "frame");
 }
 
@@ -205,9 +207,9 @@ fn a_folder_of_subjects_becomes_a_registry() {
         let registry = Registry::scan(&root).unwrap();
         let found: Vec<_> = registry.datasets.iter().map(|d| (d.id.as_str(), d.capture)).collect();
         let expected = [
-            ("multiview_ben", Capture::MultiCamera),
+            ("multiview_ben", Capture::Multiview),
             ("snapshot_ava", Capture::Monocular),
-            ("xhands_ava", Capture::Expressive),
+            ("xhands_ava", Capture::Hands),
         ];
         assert_eq!(found, expected);
     }

@@ -1,9 +1,10 @@
 //! From parameters to a body: mesh, joints, weights, texture coordinates, and what the material needs at each vertex.
 
 use super::field::{Capsule, Field, Part};
-use super::parameters::{ArmShape, Capture, FigureShape, Parameters, Rig};
+use super::parameters::{ArmShape, FigureShape, Parameters, Rig};
 use super::skeleton::{Joints, Placement, Proportions, figure_joints};
 use super::{atlas, flesh, surface, weights};
+use crate::data::Capture;
 use crate::scene::body::vertex_normals;
 use crate::scene::{RestBody, SceneError, Skeleton};
 use glam::{DVec3, Vec3};

@@ -35,7 +35,7 @@ mod truth;
 mod weights;
 
 pub use parameters::{
-    ArmShape, Capture, FigureShape, GENERATOR_VERSION, Lights, Look, Motion, Parameters, Pattern, Rig,
+    ArmShape, FigureShape, GENERATOR_VERSION, Lights, Look, Motion, Parameters, Pattern, Rig,
 };
 pub use subject::Subject;
 

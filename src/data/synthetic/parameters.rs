@@ -1,5 +1,6 @@
 //! What a synthetic subject is made of, as TOML.
 
+use crate::data::Capture;
 use crate::scene::{SceneError, camera::MAX_IMAGE_SIDE};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -51,19 +52,6 @@ pub struct Parameters {
     pub motion: Motion,
     /// What it looks like.
     pub look: Look,
-}
-
-/// The kind of capture that a subject stands in for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Capture {
-    /// One fixed camera; the subject turns in front of it to be seen from all sides.
-    #[default]
-    Monocular,
-    /// Cameras all around; test sequences are seen by cameras of their own.
-    Multiview,
-    /// One fixed camera on the upper body of a figure with finger joints.
-    Hands,
 }
 
 /// What the lights are fixed to.

@@ -1,6 +1,7 @@
 //! Where the cameras stand.
 
-use super::parameters::{Capture, Parameters, Rig};
+use super::parameters::{Parameters, Rig};
+use crate::data::Capture;
 use crate::scene::Camera;
 use glam::DVec3;
 use std::f64::consts::TAU;

@@ -2,10 +2,11 @@
 
 use super::material::Material;
 use super::motion::{self, Track};
-use super::parameters::{Capture, Parameters, Rig};
+use super::parameters::{Parameters, Rig};
 use super::stage::{self, Role};
 use super::truth::Model;
 use super::{figure, parameters::GENERATOR_VERSION};
+use crate::data::Capture;
 use crate::data::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
 use crate::scene::{Camera, Pose, RestBody, SceneError};
 use std::sync::Arc;
@@ -113,7 +114,14 @@ impl Subject {
             }
         };
         let frames = (0..poses.len() * cameras.len()).map(frame).collect();
-        Sequence { id: id.to_owned(), body: Arc::clone(self.body()), poses, cameras, frames, stored_sizes: None }
+        Sequence {
+            id: id.to_owned(),
+            body: Arc::clone(self.body()),
+            poses,
+            cameras,
+            frames,
+            stored_sizes: None,
+        }
     }
 }
 
