@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 const FOLDER: &str = "target/scenes";
 const PHASES: [Phase; 5] = [Phase::Preprocess, Phase::Sort, Phase::Bin, Phase::Blend, Phase::Write];
 /// Each line of the table takes about this long per thread count.
-const BUDGET: Duration = Duration::from_secs(3);
+const BUDGET: Duration = Duration::from_millis(1500);
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
