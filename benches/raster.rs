@@ -3,7 +3,8 @@
 //! ```text
 //! python3 benches/gen_raster_scenes.py target/scenes S M L
 //! cargo bench --bench raster
-//! cargo bench --bench raster -- --quick M     # only the table, only scene M
+//! cargo bench --bench raster -- --quick "M front"     # only the table, only these lines
+//! cargo bench --bench raster -- --quick --avx2         # with narrower vectors than the processor has
 //! ```
 //!
 //! First a table: the least wall time of many frames on one and on two threads (into existing memory, and into fresh
@@ -15,7 +16,7 @@ mod splat_scene;
 
 use criterion::Criterion;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use skinsplat::render::splat::{Phase, PhaseTimes, RenderSettings, Renderer};
+use skinsplat::render::splat::{Phase, PhaseTimes, RenderSettings, Renderer, SimdLevel};
 use skinsplat::scene::{Camera, Gaussians, Posed, Rendered};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -23,23 +24,25 @@ use std::time::{Duration, Instant};
 const FOLDER: &str = "target/scenes";
 const PHASES: [Phase; 5] = [Phase::Preprocess, Phase::Sort, Phase::Bin, Phase::Blend, Phase::Write];
 /// Each line of the table takes about this long per thread count.
-const BUDGET: Duration = Duration::from_secs(3);
+const BUDGET: Duration = Duration::from_millis(1500);
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let level = arguments.iter().any(|a| a == "--avx2").then_some(SimdLevel::Avx2);
     let quick = arguments.iter().any(|a| a == "--quick");
-    let chosen = |scene: &str| {
-        let mut names = arguments.iter().filter(|a| !a.starts_with("--")).peekable();
-        names.peek().is_none() || names.any(|name| name == scene)
+    let chosen = |line: &str| {
+        let mut patterns = arguments.iter().filter(|a| !a.starts_with("--")).peekable();
+        patterns.peek().is_none() || patterns.any(|pattern| line.contains(pattern))
     };
     let cameras = cameras();
     println!("scene view        threads   ms  fresh |  thread ms: preprocess  sort   bin  blend  write");
-    for scene in ["S", "M", "L"].into_iter().filter(|scene| chosen(scene)) {
-        let Some(gaussians) = gaussians(scene) else { continue };
+    for scene in ["S", "M", "L"] {
+        let views: Vec<_> = cameras.iter().filter(|(view, ..)| chosen(&format!("{scene} {view}"))).collect();
+        let Some(gaussians) = (!views.is_empty()).then(|| gaussians(scene)).flatten() else { continue };
         let posed = Posed::from_static(&gaussians);
-        for (view, camera, settings) in &cameras {
+        for (view, camera, settings) in views {
             for threads in [1, 2] {
-                let frame = Frame { posed: &posed, camera, settings };
+                let frame = Frame { level, posed: &posed, camera, settings };
                 let line = pool(threads).install(|| frame.measure());
                 println!("{scene:5} {view:12} {threads:6} {line}");
             }
@@ -67,6 +70,7 @@ fn criterion(cameras: &[(String, Camera, RenderSettings)]) {
 }
 
 struct Frame<'a> {
+    level: Option<SimdLevel>,
     posed: &'a Posed<'a>,
     camera: &'a Camera,
     settings: &'a RenderSettings,
@@ -75,7 +79,7 @@ struct Frame<'a> {
 impl Frame<'_> {
     /// One line of the table.
     fn measure(&self) -> String {
-        let mut renderer = Renderer::new();
+        let mut renderer = self.level.map_or_else(Renderer::new, |l| Renderer::with_simd_level(l).unwrap());
         let mut rendered: Rendered = renderer.render(self.posed, self.camera, self.settings);
         let reused = least(|| renderer.render_into(self.posed, self.camera, self.settings, &mut rendered));
         let fresh = least(|| drop(renderer.render(self.posed, self.camera, self.settings)));

@@ -36,14 +36,6 @@ pub(super) struct Pixels {
     pub(super) depth: [f32; 16],
 }
 
-impl Pixels {
-    /// A block that no splat reaches.
-    #[inline(always)]
-    pub(super) fn of_background([red, green, blue]: [f32; 3]) -> Self {
-        Self { red: [red; 16], green: [green; 16], blue: [blue; 16], alpha: [0.0; 16], depth: [0.0; 16] }
-    }
-}
-
 impl Block {
     /// Before the first splat.
     #[inline(always)]

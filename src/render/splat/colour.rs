@@ -85,16 +85,17 @@ pub(super) fn evaluate<L: Lanes>(l: L, coefficients: &[[f32; 3]], basis: impl Fn
 fn sum<const K: usize, L: Lanes>(l: L, coefficients: &[[f32; 3]], basis: impl Fn(usize) -> f32) -> [f32; 3] {
     let coefficients = &coefficients[..K];
     let flat = coefficients.as_flattened();
-    let mut sum = [0.5; 4];
+    // Two sums, since one would wait for itself.
+    let mut sums = [[0.5; 4], [0.0; 4]];
     // Four floats at a time, of which the last is the next triple's: one vector load.
     for k in 0..K - 1 {
         if let Some(four) = flat[3 * k..].first_chunk() {
-            sum = l.mul_add_four(basis(k), four, sum);
+            sums[k % 2] = l.mul_add_four(basis(k), four, sums[k % 2]);
         }
     }
     let [r, g, b] = coefficients[K - 1];
-    let [r, g, b, _] = l.mul_add_four(basis(K - 1), &[r, g, b, 0.0], sum);
-    [r, g, b]
+    let last = l.mul_add_four(basis(K - 1), &[r, g, b, 0.0], sums[1]);
+    [sums[0][0] + last[0], sums[0][1] + last[1], sums[0][2] + last[2]]
 }
 
 /// The clamp that follows.

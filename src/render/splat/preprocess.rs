@@ -71,7 +71,7 @@ impl Kernel for Preprocess<'_> {
             let count = LANES.min(splats.len() - start);
             let base = first + start;
             let group = Group::load(posed, base, count);
-            let projected = group.project(l, view).map(Wide::store);
+            let projected = group.project(l, view).map(|row| row.store());
             let basis = each(group.basis(l, view), Wide::store);
             for lane in 0..count {
                 if projected.visible[lane] == 0.0 {

@@ -110,24 +110,27 @@ pub(super) struct Ellipse<T> {
     pub(super) rightmost: T,
 }
 
-impl<T: Copy> Projected<T> {
+impl<T> Projected<T> {
     #[inline(always)]
-    pub(super) fn map<U: Copy>(&self, f: impl Fn(T) -> U) -> Projected<U> {
+    pub(super) fn map<U>(&self, f: impl Fn(&T) -> U) -> Projected<U> {
+        let two = |[a, b]: &[T; 2]| [f(a), f(b)];
+        let three = |[a, b, c]: &[T; 3]| [f(a), f(b), f(c)];
+        let [x0, x1, y0, y1] = &self.tiles;
         Projected {
-            visible: f(self.visible),
-            mean: each(self.mean, &f),
-            depth: f(self.depth),
-            covariance: each(self.covariance, &f),
-            conic: each(self.conic, &f),
-            opacity: f(self.opacity),
-            radius: f(self.radius),
-            reach: f(self.reach),
-            tiles: each(self.tiles, &f),
+            visible: f(&self.visible),
+            mean: two(&self.mean),
+            depth: f(&self.depth),
+            covariance: three(&self.covariance),
+            conic: three(&self.conic),
+            opacity: f(&self.opacity),
+            radius: f(&self.radius),
+            reach: f(&self.reach),
+            tiles: [f(x0), f(x1), f(y0), f(y1)],
             ellipse: Ellipse {
-                slope: f(self.ellipse.slope),
-                bend: f(self.ellipse.bend),
-                half_width_squared: f(self.ellipse.half_width_squared),
-                rightmost: f(self.ellipse.rightmost),
+                slope: f(&self.ellipse.slope),
+                bend: f(&self.ellipse.bend),
+                half_width_squared: f(&self.ellipse.half_width_squared),
+                rightmost: f(&self.ellipse.rightmost),
             },
         }
     }

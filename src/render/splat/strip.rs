@@ -47,10 +47,10 @@ impl Kernel for DrawStrip<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(mut self, l: L) {
         self.scratch.clock.start();
+        self.fill_background();
+        self.scratch.clock.lap(Phase::Write);
         self.gather();
         if self.scratch.entries.is_empty() {
-            self.fill_background();
-            self.scratch.clock.lap(Phase::Write);
             return;
         }
         sort_by_depth(&mut self.scratch.entries, &mut self.scratch.spare);
@@ -105,14 +105,12 @@ impl DrawStrip<'_, '_> {
 
     #[inline(always)]
     fn write<L: Lanes>(&mut self, l: L) {
-        let columns = self.rows.colour[0].len().div_ceil(BLOCK);
         for (band, blocks) in self.scratch.blocks.chunks(COLUMNS).enumerate() {
-            for (column, block) in blocks[..columns].iter().enumerate() {
-                let pixels = match block {
-                    Some(block) => block.pixels(l, self.background),
-                    None => Pixels::of_background(self.background),
-                };
-                pixels.write(&mut self.rows, column * BLOCK, band * BLOCK);
+            for (column, block) in blocks.iter().enumerate() {
+                if let Some(block) = block {
+                    let pixels = block.pixels(l, self.background);
+                    pixels.write(&mut self.rows, column * BLOCK, band * BLOCK);
+                }
             }
         }
     }
@@ -124,28 +122,25 @@ impl Pixels {
     fn write(&self, rows: &mut Rows, left: usize, top: usize) {
         for row in 0..BLOCK {
             let at = |i: usize| row * BLOCK + i;
-            let (Some(colour), Some(alpha), Some(depth)) = (
+            let colour = |i: usize| [self.red[at(i)], self.green[at(i)], self.blue[at(i)]];
+            let (Some(colours), Some(alphas), Some(depths)) = (
                 rows.colour[top + row].get_mut(left..),
                 rows.alpha[top + row].get_mut(left..),
                 rows.depth[top + row].get_mut(left..),
             ) else {
                 return; // below the image
             };
-            if let (Some(colour), Some(alpha), Some(depth)) = (
-                colour.first_chunk_mut::<BLOCK>(),
-                alpha.first_chunk_mut::<BLOCK>(),
-                depth.first_chunk_mut::<BLOCK>(),
+            if let (Some(colours), Some(alphas), Some(depths)) = (
+                colours.first_chunk_mut::<BLOCK>(),
+                alphas.first_chunk_mut::<BLOCK>(),
+                depths.first_chunk_mut::<BLOCK>(),
             ) {
-                for i in 0..BLOCK {
-                    colour[i] = [self.red[at(i)], self.green[at(i)], self.blue[at(i)]];
-                    alpha[i] = self.alpha[at(i)];
-                    depth[i] = self.depth[at(i)];
-                }
+                *colours = [colour(0), colour(1), colour(2), colour(3)];
+                alphas.copy_from_slice(&self.alpha[at(0)..at(BLOCK)]);
+                depths.copy_from_slice(&self.depth[at(0)..at(BLOCK)]);
             } else {
-                for i in 0..colour.len() {
-                    colour[i] = [self.red[at(i)], self.green[at(i)], self.blue[at(i)]];
-                    alpha[i] = self.alpha[at(i)];
-                    depth[i] = self.depth[at(i)];
+                for i in 0..colours.len() {
+                    (colours[i], alphas[i], depths[i]) = (colour(i), self.alpha[at(i)], self.depth[at(i)]);
                 }
             }
         }
