@@ -55,6 +55,18 @@ pub(super) struct Colours {
 }
 
 impl Colours {
+    /// As many colours of the same degree, all coefficients zero.
+    pub(super) fn zeroed(&self) -> Self {
+        Self { coefficients: vec![[0.0; 3]; self.coefficients.len()], ..self.clone() }
+    }
+
+    /// Adds the coefficients of a residual.
+    pub(super) fn add(&mut self, residual: &Self) {
+        for (own, more) in self.coefficients.iter_mut().zip(&residual.coefficients) {
+            *own = std::array::from_fn(|c| own[c] + more[c]);
+        }
+    }
+
     pub(super) fn of(&self, part: usize) -> &[[f32; 3]] {
         let count = sh::count(self.degree);
         &self.coefficients[part * count..(part + 1) * count]
@@ -67,17 +79,22 @@ pub(super) struct Gathering<'a> {
     pub(super) degree: usize,
     /// Strength of the pull of degrees 1 to 3 towards zero, relative to the weight of the observations.
     pub(super) smoothness: f64,
+    /// What the coefficients are relative to: 0.5 for colours, 0 for residuals.
+    pub(super) origin: f64,
     /// Observations count less the farther they are from these colours: `1 / (1 + (distance / scale)²)²`.
     pub(super) robust: Option<(&'a Colours, f64)>,
 }
 
-/// Fits every part to what `shown` makes of each frame (its truth, or a residual; colours are then read as offsets from
-/// `origin`).
+impl Gathering<'_> {
+    /// Plain mean colours.
+    pub(super) const MEAN: Self = Self { degree: 0, smoothness: 0.0, origin: 0.5, robust: None };
+}
+
+/// Fits every part to what `shown` makes of each frame: its truth, or a residual.
 pub(super) fn gather(
     sequence: &Sequence,
     parts: &Parts,
     gathering: Gathering<'_>,
-    origin: f64,
     shown: impl Fn(&Frame<'_>) -> Result<Image, Error> + Sync,
 ) -> Result<Colours, Error> {
     let mut systems = vec![System::new(gathering.degree); parts.len()];
@@ -96,9 +113,10 @@ pub(super) fn gather(
                 let Some(mut observation) = combined(parts.members(part), &seen) else { return };
                 let basis = basis(parts, part, gathering.degree, &frame.body, eye, &observation);
                 if let Some((colours, scale)) = gathering.robust {
-                    observation.weight *= robust_weight(colours.of(part), &basis, &observation, scale);
+                    observation.weight *=
+                        robust_weight(colours.of(part), &basis, &observation, gathering.origin, scale);
                 }
-                system.add(&basis, &observation, origin);
+                system.add(&basis, &observation, gathering.origin);
             });
         }
     }
@@ -148,10 +166,16 @@ fn basis(
     sh::basis(degree, (nearest_rotation(blend).inverse() * direction).to_array())
 }
 
-fn robust_weight(coefficients: &[[f32; 3]], basis: &[f64; 16], seen: &Observation, scale: f64) -> f32 {
+fn robust_weight(
+    coefficients: &[[f32; 3]],
+    basis: &[f64; 16],
+    seen: &Observation,
+    origin: f64,
+    scale: f64,
+) -> f32 {
     let distance = |c: usize| -> f64 {
         let model: f64 = coefficients.iter().zip(basis).map(|(k, b)| f64::from(k[c]) * b).sum();
-        (f64::from(seen.colour[c]) - 0.5 - model).powi(2)
+        (f64::from(seen.colour[c]) - origin - model).powi(2)
     };
     let squared = (0..3).map(distance).sum::<f64>() / 3.0;
     (1.0 / (1.0 + squared / (scale * scale)).powi(2)) as f32

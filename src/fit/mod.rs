@@ -10,6 +10,7 @@ mod fill;
 mod gather;
 mod sighting;
 pub mod surface;
+mod tessellation;
 pub mod texture;
 
 pub use error::Error;

@@ -44,7 +44,6 @@ const LEAST_COVERAGE: f32 = 0.5;
 
 /// A frame with its truth and the posed surface in front of its camera.
 pub(super) struct Frame<'a> {
-    pub(super) index: usize,
     pub(super) camera: &'a Camera,
     pub(super) body: PosedBody<'a>,
     pub(super) truth: Truth,
@@ -63,7 +62,7 @@ impl<'a> Frame<'a> {
         let fine = camera.resized(camera.width * OVERSAMPLING, camera.height * OVERSAMPLING);
         let mesh = Mesh::new(&body.mesh().vertices, &sequence.body.faces).map_err(&in_scene)?;
         let depth = visible_faces(&mesh, &fine).map_err(&in_scene)?;
-        Ok(Self { index, camera, truth, depth, eye: camera.position(), body })
+        Ok(Self { camera, truth, depth, eye: camera.position(), body })
     }
 
     /// What `image`, of the frame's size, shows at a surface point.

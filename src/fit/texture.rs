@@ -72,10 +72,9 @@ pub fn gather_texture(sequence: &Sequence, size: u32) -> Result<TexturedBody, Er
     let atlas = Atlas::new(&uv, size).map_err(Error::scene(sequence))?;
     let parts = Parts::single_points(atlas.points);
     let truth = |frame: &Frame<'_>| Ok(frame.truth.rgb.clone());
-    let mean = Gathering { degree: 0, smoothness: 0.0, robust: None };
-    let first = gather(sequence, &parts, mean, 0.5, truth)?;
-    let robust = Gathering { robust: Some((&first, ROBUST_SCALE)), ..mean };
-    let colours = gather(sequence, &parts, robust, 0.5, truth)?;
+    let first = gather(sequence, &parts, Gathering::MEAN, truth)?;
+    let robust = Gathering { robust: Some((&first, ROBUST_SCALE)), ..Gathering::MEAN };
+    let colours = gather(sequence, &parts, robust, truth)?;
 
     let texel = |(part, point): (usize, &SurfacePoint)| -> [f32; 3] {
         let own = colours.of(part)[0].map(|c| 0.5 + c * sh::C0 as f32);
