@@ -1,0 +1,100 @@
+//! View-dependent colour: real spherical harmonics to degree 3 in the 3DGS basis and order.
+
+use super::lanes::Lanes;
+use super::wide::{Wide, each};
+use crate::scene::ColourClamp;
+
+const C0: f32 = 0.282_094_791_773_878_14;
+const C1: f32 = 0.488_602_511_902_919_9;
+const C2: [f32; 5] = [
+    1.092_548_430_592_079_2,
+    -1.092_548_430_592_079_2,
+    0.315_391_565_252_520_05,
+    -1.092_548_430_592_079_2,
+    0.546_274_215_296_039_6,
+];
+const C3: [f32; 7] = [
+    -0.590_043_589_926_643_5,
+    2.890_611_442_640_554,
+    -0.457_045_799_464_465_8,
+    0.373_176_332_590_115_4,
+    -0.457_045_799_464_465_8,
+    1.445_305_721_320_277,
+    -0.590_043_589_926_643_5,
+];
+
+/// The sixteen basis functions along unit directions.
+#[inline(always)]
+pub(super) fn basis<L: Lanes>([x, y, z]: [Wide<L>; 3]) -> [Wide<L>; 16] {
+    let n = |value: f32| x.constant(value);
+    let (xx, yy, zz, xy, yz, xz) = (x * x, y * y, z * z, x * y, y * z, x * z);
+    let (difference, sum) = (xx - yy, xx + yy);
+    let four_zz = n(4.0).mul_add(zz, -sum);
+    [
+        n(C0),
+        n(-C1) * y,
+        n(C1) * z,
+        n(-C1) * x,
+        n(C2[0]) * xy,
+        n(C2[1]) * yz,
+        n(C2[2]) * n(2.0).mul_add(zz, -sum),
+        n(C2[3]) * xz,
+        n(C2[4]) * difference,
+        n(C3[0]) * y * n(3.0).mul_add(xx, -yy),
+        n(C3[1]) * xy * z,
+        n(C3[2]) * y * four_zz,
+        n(C3[3]) * z * n(2.0).mul_add(zz, n(-3.0) * sum),
+        n(C3[4]) * x * four_zz,
+        n(C3[5]) * z * difference,
+        n(C3[6]) * x * n(-3.0).mul_add(yy, xx),
+    ]
+}
+
+/// The direction in which the SH of a Gaussian are read: `normalize(F (mean - camera))`, 0 where that vanishes. F by
+/// columns.
+#[inline(always)]
+pub(super) fn direction<L: Lanes>(
+    mean: [Wide<L>; 3],
+    camera: [f32; 3],
+    frame: Option<[[Wide<L>; 3]; 3]>,
+) -> [Wide<L>; 3] {
+    let n = |value: f32| mean[0].constant(value);
+    let d = each([0, 1, 2], |i| mean[i] - n(camera[i]));
+    let turned = match frame {
+        Some(f) => each([0, 1, 2], |i| f[2][i].mul_add(d[2], f[1][i].mul_add(d[1], f[0][i] * d[0]))),
+        None => d,
+    };
+    let square = turned[2].mul_add(turned[2], turned[1].mul_add(turned[1], turned[0] * turned[0]));
+    let scale = n(0.0).less(square).keep(n(1.0) / square.sqrt());
+    each(turned, |v| v * scale)
+}
+
+/// `Σ b_k c_k + 1/2`, before clamping. `coefficients` are RGB triples, as many as the degree has; `basis(k)` is b_k.
+#[inline(always)]
+pub(super) fn evaluate(coefficients: &[[f32; 3]], basis: impl Fn(usize) -> f32) -> [f32; 3] {
+    let flat = coefficients.as_flattened();
+    // Four floats at a time, of which the last is the next triple's: one vector load.
+    let mut sum = [0.5; 4];
+    let mut add = |k: usize, c: [f32; 4]| {
+        let b = basis(k);
+        for (sum, c) in sum.iter_mut().zip(c) {
+            *sum = b.mul_add(c, *sum);
+        }
+    };
+    for (k, window) in flat.windows(4).step_by(3).enumerate() {
+        add(k, [window[0], window[1], window[2], window[3]]);
+    }
+    if let [.., [r, g, b]] = *coefficients {
+        add(coefficients.len() - 1, [r, g, b, 0.0]);
+    }
+    [sum[0], sum[1], sum[2]]
+}
+
+/// The clamp that follows; NaN becomes 0.
+#[inline(always)]
+pub(super) fn clamped(colour: [f32; 3], clamp: ColourClamp) -> [f32; 3] {
+    match clamp {
+        ColourClamp::NonNegative => each(colour, |c| c.max(0.0)),
+        ColourClamp::Unit => each(colour, |c| c.max(0.0).min(1.0)),
+    }
+}
