@@ -6,7 +6,7 @@ use super::sighting::{Frame, Observation, SurfacePoint};
 use crate::data::sequence::Sequence;
 use crate::math::rotation::nearest_rotation;
 use crate::math::sh;
-use crate::scene::{Image, PosedBody, SkinWeights};
+use crate::scene::{PosedBody, SkinWeights};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -90,24 +90,42 @@ impl Gathering<'_> {
     pub(super) const MEAN: Self = Self { degree: 0, smoothness: 0.0, origin: 0.5, robust: None };
 }
 
-/// Fits every part to what `shown` makes of each frame: its truth, or a residual.
-pub(super) fn gather(
+/// The colours of a sequence's true images: the mean over the frames that show a part, then again with the outliers
+/// weighed down, in SH of `degree`.
+pub(super) fn consensus(
+    sequence: &Sequence,
+    parts: &Parts,
+    degree: usize,
+    smoothness: f64,
+) -> Result<Colours, Error> {
+    let truth = |gathering| {
+        let show = |frame: &Frame<'_>, (): &(), point: &SurfacePoint| frame.observe(point, &frame.truth.rgb);
+        gather(sequence, parts, gathering, |_| Ok(()), show)
+    };
+    let mean = truth(Gathering::MEAN)?;
+    truth(Gathering { degree, smoothness, robust: Some((&mean, ROBUST_SCALE)), ..Gathering::MEAN })
+}
+
+/// Fits every part to what the frames show of it: `prepare` makes of each frame what `observe` then reads at every
+/// surface point.
+pub(super) fn gather<S: Send + Sync>(
     sequence: &Sequence,
     parts: &Parts,
     gathering: Gathering<'_>,
-    shown: impl Fn(&Frame<'_>) -> Result<Image, Error> + Sync,
+    prepare: impl Fn(&Frame<'_>) -> Result<S, Error> + Sync,
+    observe: impl Fn(&Frame<'_>, &S, &SurfacePoint) -> Observation + Sync,
 ) -> Result<Colours, Error> {
     let mut systems = vec![System::new(gathering.degree); parts.len()];
     let frames: Vec<usize> = (0..sequence.frames.len()).collect();
     for batch in frames.chunks(BATCH) {
-        let load = |&index: &usize| -> Result<(Frame<'_>, Image), Error> {
+        let load = |&index: &usize| -> Result<(Frame<'_>, S), Error> {
             let frame = Frame::load(sequence, index)?;
-            let image = shown(&frame)?;
-            Ok((frame, image))
+            let shown = prepare(&frame)?;
+            Ok((frame, shown))
         };
         let loaded: Vec<_> = batch.par_iter().map(load).collect::<Result<_, _>>()?;
-        for (frame, image) in &loaded {
-            let seen: Vec<Observation> = parts.points.par_iter().map(|p| frame.observe(p, image)).collect();
+        for (frame, shown) in &loaded {
+            let seen: Vec<Observation> = parts.points.par_iter().map(|p| observe(frame, shown, p)).collect();
             let eye = frame.camera.position();
             systems.par_iter_mut().enumerate().with_min_len(256).for_each(|(part, system)| {
                 let Some(mut observation) = combined(parts.members(part), &seen) else { return };

@@ -1,16 +1,17 @@
 //! Gaussians on the surface of a body, coloured by the training frames: an avatar before any optimiser, and what one
 //! starts from.
 
-use super::Error;
 use super::disc::{self, Disc};
 use super::fill::{Neighbours, fill_unknown};
-use super::gather::{Colours, Gathering, Parts, ROBUST_SCALE, gather};
+use super::gather::{Colours, Gathering, Parts, ROBUST_SCALE, consensus, gather};
 use super::sighting::{Frame, SurfacePoint};
 use super::tessellation::Tessellation;
+use super::{Error, clothing, tessellation, training};
 use crate::data::sequence::Sequence;
 use crate::math::sh;
 use crate::render::splat::{RenderSettings, render};
-use crate::scene::{Avatar, Binding, FaceBinding, Gaussians, PosedBody, SceneError, SkinWeights};
+use crate::scene::body::vertex_normals;
+use crate::scene::{Avatar, Binding, FaceBinding, Gaussians, PosedBody, RestBody, SceneError, SkinWeights};
 use crate::strategy::{BoundAvatar, Strategy, pose};
 use glam::DVec3;
 
@@ -57,6 +58,11 @@ pub struct SurfaceInit {
     pub sh_degree: usize,
     /// Pull of degrees 1 to 3 towards zero, relative to the observations.
     pub smoothness: f64,
+    /// How often the body's outline is brought closer to that of the masks before anything else: clothing and hair are
+    /// not part of a body model.
+    pub outline_rounds: usize,
+    /// At most so many training frames are looked at, evenly spread over the sequence.
+    pub most_frames: usize,
     /// How often the colours are corrected by what is missing in the rendered training frames.
     pub refinements: usize,
 }
@@ -66,14 +72,16 @@ impl Default for SurfaceInit {
         Self {
             placement: Placement::Vertices,
             bind_to: BindTo::Joints,
-            longest_edge: 0.008,
+            longest_edge: 0.01,
             scale: 1.0,
             thickness: 0.1,
-            opacity: 0.9,
-            inset: 0.0,
+            opacity: 0.99,
+            inset: 1.3,
             sh_degree: 0,
-            smoothness: 0.03,
-            refinements: 3,
+            smoothness: 0.1,
+            most_frames: 64,
+            outline_rounds: 2,
+            refinements: 2,
         }
     }
 }
@@ -84,31 +92,31 @@ impl Default for SurfaceInit {
 /// A setting out of range, a sequence without frames, a body that breaks an invariant, a frame that cannot be read.
 pub fn surface_init(sequence: &Sequence, init: &SurfaceInit) -> Result<Avatar, Error> {
     init.validate()?;
-    let (layout, mut colours) = coloured(sequence, init)?;
-    refine(sequence, &layout, init, &mut colours)?;
-    Ok(layout.avatar(init, &colours))
+    let training = training::prepared(sequence, init.most_frames)?;
+    let dressed = clothing::dressed(&training, init.outline_rounds)?;
+    let (layout, mut colours) = coloured(&dressed, init)?;
+    refine(&dressed, &layout, init, &mut colours)?;
+    Ok(layout.avatar(init, &colours, &sequence.body))
 }
 
-/// One colour per vertex of a sequence's body, also where no frame shows it.
+/// One colour per vertex of a sequence's body, also where no frame shows it; grey for vertices without a face.
 pub(super) fn vertex_colours(sequence: &Sequence) -> Result<Vec<[f32; 3]>, Error> {
     let (_, colours) = coloured(
         sequence,
         &SurfaceInit { placement: Placement::Vertices, sh_degree: 0, ..Default::default() },
     )?;
-    Ok(colours.coefficients.iter().map(|c| c.map(|c| 0.5 + c * sh::C0 as f32)).collect())
+    let mut of_body = vec![[0.5; 3]; sequence.body.vertices.len()];
+    for (vertex, coefficients) in
+        tessellation::vertices_with_faces(&sequence.body).into_iter().zip(&colours.coefficients)
+    {
+        of_body[vertex] = coefficients.map(|c| 0.5 + c * sh::C0 as f32);
+    }
+    Ok(of_body)
 }
 
 fn coloured(sequence: &Sequence, init: &SurfaceInit) -> Result<(Layout, Colours), Error> {
-    if sequence.frames.is_empty() {
-        return Err(Error::invalid(format!("sequence {}: frames", sequence.id), "none", "at least one"));
-    }
-    let body = &*sequence.body;
-    body.validate().map_err(Error::scene(sequence))?;
-    if body.faces.is_empty() {
-        return Err(Error::invalid(format!("sequence {}: body", sequence.id), "no faces", "a surface"));
-    }
     let layout = Layout::new(sequence, init).map_err(Error::scene(sequence))?;
-    let mut colours = consensus(sequence, &layout.parts, init)?;
+    let mut colours = consensus(sequence, &layout.parts, init.sh_degree, init.smoothness)?;
     let known: Vec<bool> = colours.confidence.iter().map(|&c| c > 0.0).collect();
     let centres: Vec<DVec3> = layout.discs.iter().map(|d| d.centre).collect();
     let stride = sh::count(init.sh_degree);
@@ -147,20 +155,6 @@ impl SurfaceInit {
     }
 }
 
-/// The mean colour of each part over the frames that show it, then again with the outliers weighed down, in the wanted
-/// SH degree.
-fn consensus(sequence: &Sequence, parts: &Parts, init: &SurfaceInit) -> Result<Colours, Error> {
-    let truth = |frame: &Frame<'_>| Ok(frame.truth.rgb.clone());
-    let first = gather(sequence, parts, Gathering::MEAN, truth)?;
-    let robust = Gathering {
-        degree: init.sh_degree,
-        smoothness: init.smoothness,
-        origin: 0.5,
-        robust: Some((&first, ROBUST_SCALE)),
-    };
-    gather(sequence, parts, robust, truth)
-}
-
 /// Draws the avatar into every frame and adds what is missing there to the Gaussians that are seen there, again and
 /// again: neighbouring discs blend, so a Gaussian needs more contrast than the surface that it stands for.
 fn refine(
@@ -173,7 +167,7 @@ fn refine(
         .ok_or_else(|| Error::invalid("strategy", REFINEMENT_STRATEGY, "a preset"))?;
     let settings = RenderSettings { background: REFINEMENT_BACKGROUND, antialiased: false };
     for _ in 0..init.refinements {
-        let avatar = layout.avatar(init, colours);
+        let avatar = layout.avatar(init, colours, &sequence.body);
         let bound = BoundAvatar::new(&avatar, &sequence.body).map_err(Error::strategy(sequence))?;
         let residual = |frame: &Frame<'_>| {
             let posed = pose(&bound, &frame.body, &strategy).map_err(Error::strategy(sequence))?;
@@ -193,7 +187,8 @@ fn refine(
             origin: 0.0,
             robust: Some((&none, ROBUST_SCALE)),
         };
-        colours.add(&gather(sequence, &layout.parts, gathering, residual)?);
+        colours
+            .add(&gather(sequence, &layout.parts, gathering, residual, |f, image, p| f.observe(p, image))?);
     }
     Ok(())
 }
@@ -245,22 +240,30 @@ impl Layout {
         Ok(Self { discs, sites, parts, neighbours, pixel: pixel_on_surface(sequence)? })
     }
 
-    fn avatar(&self, init: &SurfaceInit, colours: &Colours) -> Avatar {
+    /// The avatar, bound to a body whose surface may lie below the one on which the Gaussians sit.
+    fn avatar(&self, init: &SurfaceInit, colours: &Colours, body: &RestBody) -> Avatar {
         let shapes: Vec<_> = self.discs.iter().map(|d| d.gaussian(init.scale, init.thickness)).collect();
-        let inset: Vec<f64> =
-            colours.confidence.iter().map(|&c| if c > 0.0 { init.inset * self.pixel } else { 0.0 }).collect();
-        let below = |(d, inset): (&Disc, &f64)| (d.centre - d.normal * *inset).as_vec3();
+        let means: Vec<DVec3> = self
+            .discs
+            .iter()
+            .zip(&colours.confidence)
+            .map(
+                |(d, &seen)| {
+                    if seen > 0.0 { d.centre - d.normal * init.inset * self.pixel } else { d.centre }
+                },
+            )
+            .collect();
         let logit = (init.opacity / (1.0 - init.opacity)).ln() as f32;
         let binding = match (init.bind_to, self.parts.skin.clone()) {
             (BindTo::Joints, Some(skin)) => Binding::Vertex(skin),
             _ => Binding::Face(FaceBinding {
                 faces: self.sites.iter().map(|site| site.face).collect(),
                 barycentric: self.sites.iter().map(|site| site.barycentric).collect(),
-                offsets: inset.iter().map(|&i| -i as f32).collect(),
+                offsets: heights(body, &self.sites, &means),
             }),
         };
         let gaussians = Gaussians {
-            means: self.discs.iter().zip(&inset).map(below).collect(),
+            means: means.iter().map(|m| m.as_vec3()).collect(),
             rotations: shapes.iter().map(|s| s.0).collect(),
             log_scales: shapes.iter().map(|s| s.1).collect(),
             opacity_logits: vec![logit; self.discs.len()],
@@ -269,6 +272,19 @@ impl Layout {
         };
         Avatar { gaussians, binding }
     }
+}
+
+/// How far points lie above their sites on a body, along the interpolated unit vertex normal, metres.
+fn heights(body: &RestBody, sites: &[SurfacePoint], points: &[DVec3]) -> Vec<f32> {
+    let normals = vertex_normals(&body.vertices, &body.faces);
+    let height = |(site, point): (&SurfacePoint, &DVec3)| {
+        let corners = body.faces[site.face as usize];
+        let mix = |values: &[DVec3]| -> DVec3 {
+            corners.iter().zip(site.barycentric).map(|(&i, b)| values[i as usize] * f64::from(b)).sum()
+        };
+        (*point - mix(&body.vertices)).dot(mix(&normals).normalize_or_zero()) as f32
+    };
+    sites.iter().zip(points).map(height).collect()
 }
 
 /// The median over the frames of the size of a pixel at the depth of the body's middle, metres.

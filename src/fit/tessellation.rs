@@ -29,6 +29,13 @@ impl Corners {
     }
 }
 
+/// The vertices of a body that have a face, in order.
+pub(super) fn vertices_with_faces(body: &RestBody) -> Vec<usize> {
+    let mut used = vec![false; body.vertices.len()];
+    body.faces.iter().flatten().for_each(|&i| used[i as usize] = true);
+    (0..used.len()).filter(|&i| used[i]).collect()
+}
+
 /// No face is divided more often: 4^8 parts.
 const MOST_ROUNDS: usize = 8;
 /// Division stops here, whatever the edges.
@@ -39,15 +46,14 @@ impl Tessellation {
     /// them alike, so the result is as closed as the body.
     pub(super) fn new(body: &RestBody, longest_edge: f64) -> Self {
         let whole = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let mut used = vec![None; body.vertices.len()];
-        body.faces.iter().flatten().for_each(|&i| used[i as usize] = Some(0));
-        for (next, slot) in used.iter_mut().flatten().enumerate() {
-            *slot = next as u32;
+        let used = vertices_with_faces(body);
+        let mut index = vec![0; body.vertices.len()];
+        for (new, &old) in used.iter().enumerate() {
+            index[old] = new as u32;
         }
-        let kept = body.vertices.iter().zip(&used).filter(|(_, used)| used.is_some());
         let mut mesh = Self {
-            vertices: kept.map(|(&v, _)| v).collect(),
-            faces: body.faces.iter().map(|f| f.map(|i| used[i as usize].unwrap_or_default())).collect(),
+            vertices: used.iter().map(|&i| body.vertices[i]).collect(),
+            faces: body.faces.iter().map(|face| face.map(|i| index[i as usize])).collect(),
             corners: (0..body.faces.len() as u32).map(|face| Corners { face, barycentric: whole }).collect(),
         };
         for _ in 0..MOST_ROUNDS {
@@ -150,5 +156,72 @@ impl Tessellation {
     /// For every face, its centroid's place on the body.
     pub(super) fn face_sites(&self) -> Vec<SurfacePoint> {
         self.corners.iter().map(|corners| corners.at([1.0 / 3.0; 3])).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Skeleton, SkinWeights};
+
+    /// A tetrahedron with one long side, and a vertex without a face.
+    fn tetrahedron() -> RestBody {
+        let vertices = vec![DVec3::ZERO, DVec3::splat(9.0), DVec3::X * 3.0, DVec3::Y, DVec3::Z];
+        let names = vec!["root".to_owned()];
+        RestBody {
+            skeleton: Skeleton::from_joint_positions(names, vec![None], &[DVec3::ZERO]).unwrap(),
+            weights: SkinWeights::from_rows(vertices.iter().map(|_| [(0, 1.0)]), 1).unwrap(),
+            vertices,
+            faces: vec![[0, 3, 2], [0, 2, 4], [0, 4, 3], [2, 3, 4]],
+            uv: None,
+            pose_directions: Vec::new(),
+        }
+    }
+
+    fn area(vertices: &[DVec3], face: &[u32; 3]) -> DVec3 {
+        let [a, b, c] = face.map(|i| vertices[i as usize]);
+        (b - a).cross(c - a) / 2.0
+    }
+
+    #[test]
+    fn it_stays_closed_keeps_every_area_and_has_no_long_edge() {
+        let body = tetrahedron();
+        for longest in [f64::INFINITY, 2.0, 1.1, 0.7, 0.2] {
+            let mesh = Tessellation::new(&body, longest);
+            let mut areas = vec![DVec3::ZERO; body.faces.len()];
+            let mut sides = BTreeMap::new();
+            for (face, corners) in mesh.faces.iter().zip(&mesh.corners) {
+                let part = area(&mesh.vertices, face);
+                let whole = area(&body.vertices, &body.faces[corners.face as usize]);
+                assert!(part.dot(whole) > 0.0, "orientation is kept");
+                areas[corners.face as usize] += part;
+                for k in 0..3 {
+                    let (a, b) = (face[k], face[(k + 1) % 3]);
+                    assert!(mesh.vertices[a as usize].distance(mesh.vertices[b as usize]) <= longest);
+                    *sides.entry((a, b)).or_insert(0) += 1;
+                }
+            }
+            assert!(sides.iter().all(|(&(a, b), &n)| n == 1 && sides.contains_key(&(b, a))), "closed");
+            for (sum, face) in areas.iter().zip(&body.faces) {
+                assert!((*sum - area(&body.vertices, face)).length() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn sites_lie_where_the_vertices_and_centroids_are() {
+        let body = tetrahedron();
+        let mesh = Tessellation::new(&body, 0.4);
+        let place = |site: &SurfacePoint| -> DVec3 {
+            let corners = body.faces[site.face as usize].map(|i| body.vertices[i as usize]);
+            corners.iter().zip(site.barycentric).map(|(&v, b)| v * f64::from(b)).sum()
+        };
+        for (site, vertex) in mesh.vertex_sites().iter().zip(&mesh.vertices) {
+            assert!(place(site).distance(*vertex) < 1e-6);
+        }
+        for (site, face) in mesh.face_sites().iter().zip(&mesh.faces) {
+            let centre = face.iter().map(|&i| mesh.vertices[i as usize]).sum::<DVec3>() / 3.0;
+            assert!(place(site).distance(centre) < 1e-6);
+        }
     }
 }
