@@ -161,7 +161,7 @@ fn avatar_psnr(train: &Sequence, test: &Sequence, init: &SurfaceInit) -> f64 {
 }
 
 fn coarse() -> SurfaceInit {
-    SurfaceInit { longest_edge: 0.015, ..SurfaceInit::default() }
+    SurfaceInit { longest_edge: 0.03, ..SurfaceInit::default() }
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn gaussians_recover_the_colours_of_a_sphere() {
     let train = all_round(painted);
     let test = held_out(&train.body, painted);
     for (placement, bind_to) in [(Placement::Vertices, BindTo::Joints), (Placement::Faces, BindTo::Faces)] {
-        let init = SurfaceInit { placement, bind_to, ..coarse() };
+        let init = SurfaceInit { placement, bind_to, longest_edge: 0.015, ..SurfaceInit::default() };
         let found = avatar_psnr(&train, &test, &init);
         assert!(found > 30.0, "{placement:?}: {found} dB");
     }
@@ -243,7 +243,8 @@ fn clothing_is_found_from_the_outlines() {
 
 #[test]
 fn avatars_are_the_same_for_any_number_of_threads() {
-    let train = all_round(painted);
+    let mut train = all_round(painted);
+    train.frames.truncate(5);
     let make = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let init = SurfaceInit { sh_degree: 1, ..coarse() };

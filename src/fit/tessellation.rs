@@ -99,14 +99,12 @@ impl Tessellation {
             let (p, q) = (corners.barycentric[k], corners.barycentric[(k + 1) % 3]);
             std::array::from_fn(|c| (p[c] + q[c]) / 2.0)
         };
-        // a ring of six: corner, middle, corner, ...
-        let id = |k: usize| if k % 2 == 0 { Some(face[k / 2]) } else { middles[k / 2] };
-        let ring: Vec<(u32, [f32; 3])> = (0..6)
-            .filter_map(|k| {
-                let barycentric = if k % 2 == 0 { corners.barycentric[k / 2] } else { halfway(k / 2) };
-                id(k).map(|vertex| (vertex, barycentric))
-            })
-            .collect();
+        // round the face: corner, middle of the edge if it has one, corner, ...
+        let mut ring = Vec::with_capacity(6);
+        for k in 0..3 {
+            ring.push((face[k], corners.barycentric[k]));
+            ring.extend(middles[k].map(|vertex| (vertex, halfway(k))));
+        }
         let mut add = |parts: [usize; 3]| {
             self.faces.push(parts.map(|k| ring[k].0));
             let barycentric = parts.map(|k| ring[k].1);
