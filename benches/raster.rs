@@ -1,59 +1,132 @@
-//! temp
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason = "temp")]
+//! The splatting rasterizer on the scenes of other rasterizers' figures. Make them first (numpy is all it needs):
+//!
+//! ```text
+//! python3 benches/gen_raster_scenes.py target/scenes S M L
+//! cargo bench --bench raster
+//! cargo bench --bench raster -- --quick M     # only the table, only scene M
+//! ```
+//!
+//! First a table: the least wall time of many frames on one and on two threads (into existing memory, and into fresh
+//! memory), and the thread time of each phase. Then criterion's statistics of the two figures that the README gives.
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints its results")]
+
 #[path = "../tests/support/splat_scene.rs"]
 mod splat_scene;
-use skinsplat::render::splat::*;
-use skinsplat::scene::*;
-use std::time::Instant;
+
+use criterion::Criterion;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use skinsplat::render::splat::{Phase, PhaseTimes, RenderSettings, Renderer};
+use skinsplat::scene::{Camera, Gaussians, Posed, Rendered};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+const FOLDER: &str = "target/scenes";
+const PHASES: [Phase; 5] = [Phase::Preprocess, Phase::Sort, Phase::Bin, Phase::Blend, Phase::Write];
+/// Each line of the table takes about this long per thread count.
+const BUDGET: Duration = Duration::from_secs(3);
+
 fn main() {
-    let cams: serde_json::Value =
-        serde_json::from_slice(&std::fs::read("target/scenes/cameras.json").unwrap()).unwrap();
-    let level = match std::env::var("LEVEL").as_deref() {
-        Ok("avx2") => SimdLevel::Avx2,
-        _ => SimdLevel::Avx512,
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let quick = arguments.iter().any(|a| a == "--quick");
+    let chosen = |scene: &str| {
+        let mut names = arguments.iter().filter(|a| !a.starts_with("--")).peekable();
+        names.peek().is_none() || names.any(|name| name == scene)
     };
-    let only = std::env::var("ONLY").unwrap_or_default();
-    let reps: usize = std::env::var("REPS").ok().map_or(60, |v| v.parse().unwrap());
-    for scene in ["S", "M", "L"] {
-        if !only.is_empty() && !only.starts_with(scene) {
-            continue;
-        }
-        let g = splat_scene::gaussians(format!("target/scenes/scene_{scene}.ply").as_ref());
-        let posed = Posed::from_static(&g);
-        for cam in cams["cameras"].as_array().unwrap() {
-            let name = cam["name"].as_str().unwrap();
-            if !only.is_empty() && !format!("{scene} {name}").starts_with(&only) {
-                continue;
-            }
-            let (camera, background) = splat_scene::camera(cam);
-            let settings = RenderSettings { background, antialiased: false };
-            for threads in std::env::var("THREADS").map_or(vec![1, 2], |v| vec![v.parse().unwrap()]) {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| {
-                    let mut r = Renderer::with_simd_level(level).unwrap();
-                    let mut out = r.render(&posed, &camera, &settings);
-                    let (mut best, mut fresh) = (f64::MAX, f64::MAX);
-                    for _ in 0..reps {
-                        let t = Instant::now();
-                        r.render_into(&posed, &camera, &settings, &mut out);
-                        best = best.min(t.elapsed().as_secs_f64());
-                    }
-                    for _ in 0..if std::env::var("QUICK").is_ok() {0} else {reps / 4} {
-                        let t = Instant::now();
-                        let o = r.render(&posed, &camera, &settings);
-                        fresh = fresh.min(t.elapsed().as_secs_f64());
-                        drop(o);
-                    }
-                    let mut p = [f64::MAX; 5];
-                    for _ in 0..if std::env::var("QUICK").is_ok() {0} else {reps / 4} {
-                        let t = r.render_profiled(&posed, &camera, &settings, &mut out);
-                        for (i, ph) in [Phase::Preprocess, Phase::Sort, Phase::Bin, Phase::Blend, Phase::Write].into_iter().enumerate() {
-                            p[i] = p[i].min(t.of(ph).as_secs_f64() * 1e3);
-                        }
-                    }
-                    println!("{scene} {name} threads {threads}: {:.2} ms (fresh {:.2})  pre {:.2} sort {:.2} bin {:.2} blend {:.2} write {:.2}", best * 1e3, fresh*1e3, p[0], p[1], p[2], p[3], p[4]);
-                });
+    let cameras = cameras();
+    println!("scene view        threads   ms  fresh |  thread ms: preprocess  sort   bin  blend  write");
+    for scene in ["S", "M", "L"].into_iter().filter(|scene| chosen(scene)) {
+        let Some(gaussians) = gaussians(scene) else { continue };
+        let posed = Posed::from_static(&gaussians);
+        for (view, camera, settings) in &cameras {
+            for threads in [1, 2] {
+                let frame = Frame { posed: &posed, camera, settings };
+                let line = pool(threads).install(|| frame.measure());
+                println!("{scene:5} {view:12} {threads:6} {line}");
             }
         }
     }
+    if !quick {
+        criterion(&cameras);
+    }
+}
+
+fn criterion(cameras: &[(String, Camera, RenderSettings)]) {
+    let mut criterion = Criterion::default().sample_size(30).configure_from_args();
+    for (scene, view) in [("S", "front_512"), ("M", "front_1024")] {
+        let Some(gaussians) = gaussians(scene) else { continue };
+        let posed = Posed::from_static(&gaussians);
+        let (_, camera, settings) = cameras.iter().find(|(name, ..)| name == view).unwrap();
+        let mut renderer = Renderer::new();
+        let mut rendered = renderer.render(&posed, camera, settings);
+        let pool = pool(2);
+        criterion.bench_function(&format!("render/{scene}/{view}/2 threads"), |b| {
+            b.iter(|| pool.install(|| renderer.render_into(&posed, camera, settings, &mut rendered)));
+        });
+    }
+    criterion.final_summary();
+}
+
+struct Frame<'a> {
+    posed: &'a Posed<'a>,
+    camera: &'a Camera,
+    settings: &'a RenderSettings,
+}
+
+impl Frame<'_> {
+    /// One line of the table.
+    fn measure(&self) -> String {
+        let mut renderer = Renderer::new();
+        let mut rendered: Rendered = renderer.render(self.posed, self.camera, self.settings);
+        let reused = least(|| renderer.render_into(self.posed, self.camera, self.settings, &mut rendered));
+        let fresh = least(|| drop(renderer.render(self.posed, self.camera, self.settings)));
+        let mut phases = [f64::INFINITY; PHASES.len()];
+        least(|| {
+            let times: PhaseTimes =
+                renderer.render_profiled(self.posed, self.camera, self.settings, &mut rendered);
+            for (least, phase) in phases.iter_mut().zip(PHASES) {
+                *least = least.min(times.of(phase).as_secs_f64() * 1e3);
+            }
+        });
+        let [preprocess, sort, bin, blend, write] = phases;
+        format!("{reused:6.2} {fresh:6.2} | {preprocess:21.2} {sort:5.2} {bin:5.2} {blend:6.2} {write:6.2}")
+    }
+}
+
+/// The least time of a call, ms.
+fn least(mut call: impl FnMut()) -> f64 {
+    let (start, mut least) = (Instant::now(), f64::INFINITY);
+    while start.elapsed() < BUDGET / 3 {
+        let before = Instant::now();
+        call();
+        least = least.min(before.elapsed().as_secs_f64() * 1e3);
+    }
+    least
+}
+
+fn pool(threads: usize) -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+}
+
+/// A scene, if it has been made.
+fn gaussians(scene: &str) -> Option<Gaussians> {
+    let path = Path::new(FOLDER).join(format!("scene_{scene}.ply"));
+    if path.exists() {
+        return Some(splat_scene::gaussians(&path));
+    }
+    println!("{} is missing: python3 benches/gen_raster_scenes.py {FOLDER} {scene}", path.display());
+    None
+}
+
+fn cameras() -> Vec<(String, Camera, RenderSettings)> {
+    let path = Path::new(FOLDER).join("cameras.json");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        println!("{} is missing: python3 benches/gen_raster_scenes.py {FOLDER} S M", path.display());
+        return Vec::new();
+    };
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let view = |json: &serde_json::Value| {
+        let (camera, background) = splat_scene::camera(json);
+        (json["name"].as_str().unwrap().to_owned(), camera, RenderSettings { background, antialiased: false })
+    };
+    json["cameras"].as_array().unwrap().iter().map(view).collect()
 }

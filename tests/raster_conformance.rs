@@ -1,5 +1,5 @@
 //! The splatting rasterizer against images that the original 3DGS kernels computed, and against reference values in f64.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; the agreement is printed")]
 
 #[path = "support/splat_scene.rs"]
 mod splat_scene;

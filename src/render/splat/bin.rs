@@ -19,9 +19,6 @@ pub(super) struct Grid {
     pub(super) down: usize,
 }
 
-/// A rectangle of strips: x from, x to, y from, y to; half open.
-type StripRect = [u16; 4];
-
 impl Grid {
     pub(super) fn new(tiles: [usize; 2]) -> Self {
         Self { across: tiles[0].div_ceil(STRIP_TILES), down: tiles[1] }
@@ -29,22 +26,6 @@ impl Grid {
 
     pub(super) fn count(self) -> usize {
         self.across * self.down
-    }
-
-    /// The strips that hold a non-empty rectangle of tiles.
-    #[inline(always)]
-    pub(super) fn strips(self, [x0, x1, y0, y1]: [u16; 4]) -> StripRect {
-        const SIDE: u16 = STRIP_TILES as u16;
-        [x0 / SIDE, (x1 - 1) / SIDE + 1, y0, y1]
-    }
-
-    #[inline(always)]
-    fn each(self, [x0, x1, y0, y1]: StripRect, mut visit: impl FnMut(usize)) {
-        for y in usize::from(y0)..usize::from(y1) {
-            for x in usize::from(x0)..usize::from(x1) {
-                visit(y * self.across + x);
-            }
-        }
     }
 }
 
@@ -61,7 +42,8 @@ pub(super) fn splat_of(entry: Entry) -> usize {
 /// The splats of one chunk, by strip.
 #[derive(Debug, Default)]
 pub(super) struct Bins {
-    splats: Vec<(Entry, StripRect)>,
+    /// Strip and splat, in index order.
+    pairs: Vec<(u32, Entry)>,
     entries: Vec<Entry>,
     /// `entries[ends[s - 1]..ends[s]]` belong to strip s.
     ends: Vec<u32>,
@@ -70,23 +52,29 @@ pub(super) struct Bins {
 impl Bins {
     #[inline(always)]
     pub(super) fn clear(&mut self) {
-        self.splats.clear();
+        self.pairs.clear();
     }
 
-    /// Adds a splat; indices must rise.
+    /// Enters a splat into the strips that hold a non-empty rectangle of tiles (x from, x to, y from, y to; half open).
+    /// Indices must rise.
     #[inline(always)]
-    pub(super) fn push(&mut self, index: u32, depth: f32, strips: StripRect) {
-        self.splats.push((u64::from(depth.to_bits()) << 32 | u64::from(index), strips));
+    pub(super) fn push(&mut self, grid: Grid, index: u32, depth: f32, [x0, x1, y0, y1]: [u16; 4]) {
+        let entry = u64::from(depth.to_bits()) << 32 | u64::from(index);
+        for y in usize::from(y0)..usize::from(y1) {
+            for x in usize::from(x0) / STRIP_TILES..=usize::from(x1 - 1) / STRIP_TILES {
+                self.pairs.push(((y * grid.across + x) as u32, entry));
+            }
+        }
     }
 
-    /// Sorts what was added by strip, by counting.
+    /// Sorts what was entered by strip, by counting.
     #[inline(always)]
     pub(super) fn finish(&mut self, grid: Grid) {
         // Shifted by one, so that filling turns starts into ends.
         self.ends.clear();
         self.ends.resize(grid.count() + 1, 0);
-        for &(_, rect) in &self.splats {
-            grid.each(rect, |strip| self.ends[strip + 1] += 1);
+        for &(strip, _) in &self.pairs {
+            self.ends[strip as usize + 1] += 1;
         }
         let mut total = 0;
         for end in &mut self.ends {
@@ -95,12 +83,10 @@ impl Bins {
         }
         self.entries.clear();
         self.entries.resize(total as usize, 0);
-        for &(entry, rect) in &self.splats {
-            grid.each(rect, |strip| {
-                let slot = &mut self.ends[strip];
-                self.entries[*slot as usize] = entry;
-                *slot += 1;
-            });
+        for &(strip, entry) in &self.pairs {
+            let slot = &mut self.ends[strip as usize];
+            self.entries[*slot as usize] = entry;
+            *slot += 1;
         }
     }
 

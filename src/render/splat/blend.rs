@@ -8,8 +8,8 @@ use super::wide::{Wide, each};
 const MAX_ALPHA: f32 = 0.99;
 /// A splat that would leave less transmittance than this is not blended, and the pixel is done.
 const LEAST_TRANSMITTANCE: f32 = 1e-4;
-/// x of a pixel that is done: no splat reaches it.
-const DONE: f32 = 1e30;
+/// Splats between two looks at whether all pixels of the block are done.
+const BETWEEN_CHECKS: usize = 8;
 
 /// Columns and rows of a block's pixels.
 const COLUMN: [f32; 16] = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
@@ -19,82 +19,77 @@ const ROW: [f32; 16] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Block {
-    x: [f32; 16],
     transmittance: [f32; 16],
+    /// The transmittance of pixels that are not done, 0 of those that are.
+    open: [f32; 16],
     colour: [[f32; 16]; 3],
     depth: [f32; 16],
 }
 
-/// A finished pixel.
+/// A finished block.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pixel {
-    pub(super) colour: [f32; 3],
-    pub(super) alpha: f32,
-    pub(super) depth: f32,
+pub(super) struct Pixels {
+    pub(super) red: [f32; 16],
+    pub(super) green: [f32; 16],
+    pub(super) blue: [f32; 16],
+    pub(super) alpha: [f32; 16],
+    pub(super) depth: [f32; 16],
 }
 
 impl Block {
-    /// An untouched block whose first pixel column is `left`.
+    /// Before the first splat.
     #[inline(always)]
-    pub(super) fn new(left: usize) -> Self {
-        Self {
-            x: each(COLUMN, |column| left as f32 + column),
-            transmittance: [1.0; 16],
-            colour: [[0.0; 16]; 3],
-            depth: [0.0; 16],
+    pub(super) fn new() -> Self {
+        Self { transmittance: [1.0; 16], open: [1.0; 16], colour: [[0.0; 16]; 3], depth: [0.0; 16] }
+    }
+
+    /// The block over the background.
+    #[inline(always)]
+    pub(super) fn pixels<L: Lanes>(&self, l: L, background: [f32; 3]) -> Pixels {
+        let transmittance = Wide::load(l, &self.transmittance);
+        let over = |c: usize| {
+            transmittance.mul_add(Wide::splat(l, background[c]), Wide::load(l, &self.colour[c])).store()
+        };
+        Pixels {
+            red: over(0),
+            green: over(1),
+            blue: over(2),
+            alpha: (Wide::splat(l, 1.0) - transmittance).store(),
+            depth: self.depth,
         }
     }
 
-    /// True when no further splat can change it.
+    /// Blends the listed splats, in order, into the block whose first pixel is (`left`, `top`).
     #[inline(always)]
-    pub(super) fn is_done(&self) -> bool {
-        self.x.iter().all(|&x| x == DONE)
-    }
-
-    /// One pixel over the background.
-    #[inline(always)]
-    pub(super) fn pixel(&self, i: usize, background: [f32; 3]) -> Pixel {
-        let t = self.transmittance[i];
-        Pixel {
-            colour: std::array::from_fn(|c| t.mul_add(background[c], self.colour[c][i])),
-            alpha: 1.0 - t,
-            depth: self.depth[i],
-        }
-    }
-
-    /// Blends the listed splats, in order, into the block whose first pixel row is `top`.
-    #[inline(always)]
-    pub(super) fn blend<L: Lanes>(&mut self, l: L, top: usize, list: &[u16], splats: &[Splat]) {
+    pub(super) fn blend<L: Lanes>(&mut self, l: L, [left, top]: [usize; 2], list: &[u16], splats: &[Splat]) {
         let n = |value: f32| Wide::splat(l, value);
-        let mut x = Wide::load(l, &self.x);
+        let x = Wide::load(l, &COLUMN) + n(left as f32);
         let y = Wide::load(l, &ROW) + n(top as f32);
         let mut transmittance = Wide::load(l, &self.transmittance);
+        let mut open = Wide::load(l, &self.open);
         let [mut red, mut green, mut blue] = each(self.colour, |c| Wide::load(l, &c));
         let mut depth = Wide::load(l, &self.depth);
-        for &i in list {
-            let paint = &splats[usize::from(i)].paint;
-            let mut alpha = alpha(paint, x, y);
-            let mut after = alpha.neg_mul_add(transmittance, transmittance);
-            let done = after.less(n(LEAST_TRANSMITTANCE));
-            let mut all_done = false;
-            if done.any() {
-                x = done.select(n(DONE), x);
-                alpha = done.select(n(0.0), alpha);
-                after = done.select(transmittance, after);
-                all_done = !x.less(n(DONE)).any();
-            }
-            let weight = alpha * transmittance;
-            red = weight.mul_add(n(paint.colour[0]), red);
-            green = weight.mul_add(n(paint.colour[1]), green);
-            blue = weight.mul_add(n(paint.colour[2]), blue);
-            depth = weight.mul_add(n(paint.depth), depth);
-            transmittance = after;
-            if all_done {
+        for run in list.chunks(BETWEEN_CHECKS) {
+            if !n(0.0).less(open).any() {
                 break;
             }
+            for &i in run {
+                let paint = &splats[usize::from(i)].paint;
+                let alpha = alpha(paint, x, y);
+                // Without a branch: pixels finish at different splats, which no processor predicts.
+                let after = alpha.neg_mul_add(open, open);
+                let enough = after.at_least(n(LEAST_TRANSMITTANCE));
+                let weight = enough.keep(alpha * open);
+                open = enough.keep(after);
+                transmittance = enough.select(after, transmittance);
+                red = weight.mul_add(n(paint.colour[0]), red);
+                green = weight.mul_add(n(paint.colour[1]), green);
+                blue = weight.mul_add(n(paint.colour[2]), blue);
+                depth = weight.mul_add(n(paint.depth), depth);
+            }
         }
-        self.x = x.store();
         self.transmittance = transmittance.store();
+        self.open = open.store();
         self.colour = [red.store(), green.store(), blue.store()];
         self.depth = depth.store();
     }

@@ -69,32 +69,40 @@ pub(super) fn direction<L: Lanes>(
     each(turned, |v| v * scale)
 }
 
-/// `Σ b_k c_k + 1/2`, before clamping. `coefficients` are RGB triples, as many as the degree has; `basis(k)` is b_k.
+/// `Σ b_k c_k + 1/2`, before clamping, of one Gaussian. `coefficients` are RGB triples, as many as the degree has;
+/// `basis(k)` is b_k.
 #[inline(always)]
-pub(super) fn evaluate(coefficients: &[[f32; 3]], basis: impl Fn(usize) -> f32) -> [f32; 3] {
-    let flat = coefficients.as_flattened();
-    // Four floats at a time, of which the last is the next triple's: one vector load.
-    let mut sum = [0.5; 4];
-    let mut add = |k: usize, c: [f32; 4]| {
-        let b = basis(k);
-        for (sum, c) in sum.iter_mut().zip(c) {
-            *sum = b.mul_add(c, *sum);
-        }
-    };
-    for (k, window) in flat.windows(4).step_by(3).enumerate() {
-        add(k, [window[0], window[1], window[2], window[3]]);
+pub(super) fn evaluate<L: Lanes>(l: L, coefficients: &[[f32; 3]], basis: impl Fn(usize) -> f32) -> [f32; 3] {
+    match coefficients.len() {
+        1 => sum::<1, L>(l, coefficients, basis),
+        4 => sum::<4, L>(l, coefficients, basis),
+        9 => sum::<9, L>(l, coefficients, basis),
+        _ => sum::<16, L>(l, coefficients, basis),
     }
-    if let [.., [r, g, b]] = *coefficients {
-        add(coefficients.len() - 1, [r, g, b, 0.0]);
-    }
-    [sum[0], sum[1], sum[2]]
 }
 
-/// The clamp that follows; NaN becomes 0.
+#[inline(always)]
+fn sum<const K: usize, L: Lanes>(l: L, coefficients: &[[f32; 3]], basis: impl Fn(usize) -> f32) -> [f32; 3] {
+    let coefficients = &coefficients[..K];
+    let flat = coefficients.as_flattened();
+    // Two sums, since one would wait for itself.
+    let mut sums = [[0.5; 4], [0.0; 4]];
+    // Four floats at a time, of which the last is the next triple's: one vector load.
+    for k in 0..K - 1 {
+        if let Some(four) = flat[3 * k..].first_chunk() {
+            sums[k % 2] = l.mul_add_four(basis(k), four, sums[k % 2]);
+        }
+    }
+    let [r, g, b] = coefficients[K - 1];
+    let last = l.mul_add_four(basis(K - 1), &[r, g, b, 0.0], sums[1]);
+    [sums[0][0] + last[0], sums[0][1] + last[1], sums[0][2] + last[2]]
+}
+
+/// The clamp that follows.
 #[inline(always)]
 pub(super) fn clamped(colour: [f32; 3], clamp: ColourClamp) -> [f32; 3] {
     match clamp {
         ColourClamp::NonNegative => each(colour, |c| c.max(0.0)),
-        ColourClamp::Unit => each(colour, |c| c.max(0.0).min(1.0)),
+        ColourClamp::Unit => each(colour, |c| c.clamp(0.0, 1.0)),
     }
 }

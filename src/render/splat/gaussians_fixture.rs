@@ -134,7 +134,7 @@ fn colours_have_the_reference_values_at_every_degree() {
         for degree in 0..=3 {
             let expected = &case["sh_rgb"][degree.to_string()];
             let count = (degree + 1) * (degree + 1);
-            let unclamped = colour::evaluate(&sh[..count], |k| basis[k]);
+            let unclamped = colour::evaluate(Arrays, &sh[..count], |k| basis[k]);
             let rgb = colour::clamped(unclamped, ColourClamp::NonNegative);
             for c in 0..3 {
                 close("unclamped", i, unclamped[c], number(&expected["unclamped"][c]), 1.0, 1e-5);

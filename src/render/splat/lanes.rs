@@ -19,6 +19,8 @@ pub(super) trait Lanes: Copy {
     fn div(self, a: Self::F, b: Self::F) -> Self::F;
     /// `a b + c`, rounded once.
     fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// `a b + c`, rounded once, on four numbers.
+    fn mul_add_four(self, a: f32, b: &[f32; 4], c: [f32; 4]) -> [f32; 4];
     /// `c - a b`, rounded once.
     fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// `a` where `a < b`, else `b`.
@@ -39,6 +41,8 @@ pub(super) trait Lanes: Copy {
     /// `0 <= a <= limit` for positive limits (−0 counts as negative).
     fn in_range(self, a: Self::F, limit: Self::F) -> Self::M;
     fn less(self, a: Self::F, b: Self::F) -> Self::M;
+    /// `a >= b`.
+    fn at_least(self, a: Self::F, b: Self::F) -> Self::M;
     fn both(self, a: Self::M, b: Self::M) -> Self::M;
     fn any(self, mask: Self::M) -> bool;
     /// `a` where the mask is set, else 0.
@@ -179,6 +183,10 @@ impl Lanes for Arrays {
         std::array::from_fn(|i| a[i].mul_add(b[i], c[i]))
     }
     #[inline(always)]
+    fn mul_add_four(self, a: f32, b: &[f32; 4], c: [f32; 4]) -> [f32; 4] {
+        std::array::from_fn(|i| a.mul_add(b[i], c[i]))
+    }
+    #[inline(always)]
     fn neg_mul_add(self, a: [f32; 16], b: [f32; 16], c: [f32; 16]) -> [f32; 16] {
         std::array::from_fn(|i| (-a[i]).mul_add(b[i], c[i]))
     }
@@ -227,6 +235,10 @@ impl Lanes for Arrays {
     #[inline(always)]
     fn less(self, a: [f32; 16], b: [f32; 16]) -> [bool; 16] {
         zip(a, b, |a, b| a < b)
+    }
+    #[inline(always)]
+    fn at_least(self, a: [f32; 16], b: [f32; 16]) -> [bool; 16] {
+        zip(a, b, |a, b| a >= b)
     }
     #[inline(always)]
     fn both(self, a: [bool; 16], b: [bool; 16]) -> [bool; 16] {

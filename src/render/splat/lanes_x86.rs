@@ -41,6 +41,10 @@ impl Lanes for V4 {
         self.mul_add_f32x16(a, b, c)
     }
     #[inline(always)]
+    fn mul_add_four(self, a: f32, b: &[f32; 4], c: [f32; 4]) -> [f32; 4] {
+        (*self).mul_add_four(a, b, c)
+    }
+    #[inline(always)]
     fn neg_mul_add(self, a: f32x16, b: f32x16, c: f32x16) -> f32x16 {
         self.negate_mul_add_f32x16(a, b, c)
     }
@@ -94,6 +98,10 @@ impl Lanes for V4 {
     #[inline(always)]
     fn less(self, a: f32x16, b: f32x16) -> pulp::b16 {
         self.cmp_lt_f32x16(a, b)
+    }
+    #[inline(always)]
+    fn at_least(self, a: f32x16, b: f32x16) -> pulp::b16 {
+        self.cmp_ge_f32x16(a, b)
     }
     #[inline(always)]
     fn both(self, a: pulp::b16, b: pulp::b16) -> pulp::b16 {
@@ -165,6 +173,10 @@ impl Lanes for V3 {
         [self.mul_add_f32x8(a[0], b[0], c[0]), self.mul_add_f32x8(a[1], b[1], c[1])]
     }
     #[inline(always)]
+    fn mul_add_four(self, a: f32, b: &[f32; 4], c: [f32; 4]) -> [f32; 4] {
+        cast(self.mul_add_f32x4(self.splat_f32x4(a), cast(*b), cast(c)))
+    }
+    #[inline(always)]
     fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
         [self.negate_mul_add_f32x8(a[0], b[0], c[0]), self.negate_mul_add_f32x8(a[1], b[1], c[1])]
     }
@@ -225,6 +237,10 @@ impl Lanes for V3 {
     #[inline(always)]
     fn less(self, a: Self::F, b: Self::F) -> Self::M {
         zip(a, b, |a, b| self.cmp_lt_f32x8(a, b))
+    }
+    #[inline(always)]
+    fn at_least(self, a: Self::F, b: Self::F) -> Self::M {
+        zip(a, b, |a, b| self.cmp_ge_f32x8(a, b))
     }
     #[inline(always)]
     fn both(self, a: Self::M, b: Self::M) -> Self::M {

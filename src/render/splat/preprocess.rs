@@ -78,7 +78,7 @@ impl Kernel for Preprocess<'_> {
                     continue;
                 }
                 let sh = &posed.sh[(base + lane) * coefficients..][..coefficients];
-                let colour = colour::evaluate(sh, |k| basis[k][lane]);
+                let colour = colour::evaluate(l, sh, |k| basis[k][lane]);
                 if !colour.iter().all(|c| c.is_finite()) {
                     continue;
                 }
@@ -90,7 +90,7 @@ impl Kernel for Preprocess<'_> {
                     ellipse: p.ellipse,
                     columns: [tiles[0], tiles[1]],
                 };
-                bins.push((first + written) as u32, p.depth, grid.strips(tiles));
+                bins.push(grid, (first + written) as u32, p.depth, tiles);
                 written += 1;
             }
         }

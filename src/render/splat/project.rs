@@ -158,9 +158,8 @@ pub(super) fn project<L: Lanes>(
 
     let ratio = ((bare_xx * bare_yy - xy * xy) * inverse).max(number(LEAST_COMPENSATION));
     let opacity = if view.antialiased { opacity * ratio.sqrt() } else { opacity };
-    // In this order NaN stays NaN.
-    let opacity = number(MAX_OPACITY).min(opacity);
-    let reach = (number(255.0) * opacity).log2();
+    let bounded = opacity.min(number(MAX_OPACITY));
+    let reach = (number(255.0) * bounded).log2();
     // The power at a pixel is a difference of terms as large as xx yy / det times itself; each is off by a few ulp.
     let slack = (xx * yy * inverse).mul_add(number(4e-6), number(1.0 + 1e-4));
     let square = reach.mul_add(slack, number(1e-4)) * number(1.0 / HALF_LOG2_E);
@@ -176,7 +175,8 @@ pub(super) fn project<L: Lanes>(
     };
 
     // One infinity or NaN among these makes their sum so.
-    let parts = [mean[0], mean[1], z, xx, yy, radius, square, determinant, inverse, half_width_squared];
+    let parts =
+        [opacity, mean[0], mean[1], z, xx, yy, radius, square, determinant, inverse, half_width_squared];
     let mut sum = number(0.0);
     for part in parts {
         sum = sum + part.abs();
@@ -190,7 +190,7 @@ pub(super) fn project<L: Lanes>(
         depth: z,
         covariance: [xx, xy, yy],
         conic,
-        opacity,
+        opacity: bounded,
         radius,
         reach,
         tiles: [x0, x1, y0, y1],

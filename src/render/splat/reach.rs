@@ -7,7 +7,7 @@ use super::bin::STRIP_TILES;
 use super::lanes::Lanes;
 use super::preprocess::Splat;
 use super::project::{SAFETY, TILE};
-use super::wide::{Wide, each};
+use super::wide::Wide;
 
 /// Side of a block, pixels.
 pub(super) const BLOCK: usize = 4;
@@ -28,7 +28,10 @@ const NEXT: usize = 256;
 pub(super) struct Segment {
     pub(super) splats: Vec<Splat>,
     bounds: Vec<Bounds>,
-    spans: Vec<[u16; 16]>,
+    spans: Vec<[i32; 16]>,
+    /// The `kept` splats that reach the band: index in the high half, span in the low.
+    reached: Vec<u32>,
+    kept: usize,
     /// Of all blocks of the band, one after the other.
     lists: Vec<u16>,
     /// Where each block's list ends.
@@ -37,7 +40,15 @@ pub(super) struct Segment {
 
 impl Default for Segment {
     fn default() -> Self {
-        Self { splats: Vec::new(), bounds: Vec::new(), spans: Vec::new(), lists: Vec::new(), next: [0; NEXT] }
+        Self {
+            splats: Vec::new(),
+            bounds: Vec::new(),
+            spans: Vec::new(),
+            reached: Vec::new(),
+            kept: 0,
+            lists: Vec::new(),
+            next: [0; NEXT],
+        }
     }
 }
 
@@ -90,8 +101,9 @@ impl Segment {
         self.spans.clear();
         let top = (band * BLOCK) as f32;
         for bounds in &self.bounds {
-            self.spans.push(each(spans(l, bounds, top), |span| span as u16));
+            self.spans.push(spans(l, bounds, top));
         }
+        self.keep_reached();
         self.fill_lists();
     }
 
@@ -102,13 +114,29 @@ impl Segment {
         &self.lists[start..self.next[column] as usize]
     }
 
+    /// Collects the splats that reach the band, without a branch to predict.
+    #[inline(always)]
+    fn keep_reached(&mut self) {
+        let spans = self.spans.as_flattened();
+        if self.reached.len() < spans.len() {
+            self.reached.resize(spans.len(), 0);
+        }
+        let mut kept = 0;
+        for (i, &span) in spans.iter().enumerate() {
+            self.reached[kept] = (i as u32) << 16 | span as u32;
+            kept += usize::from(span != 0);
+        }
+        self.kept = kept;
+    }
+
     #[inline(always)]
     fn fill_lists(&mut self) {
         // Differences of the counts, then starts; filling turns them into ends. An index of 8 bits cannot miss the array.
         let next = &mut self.next;
         *next = [0; NEXT];
-        for &span in self.spans.as_flattened() {
-            let [first, end] = span.to_le_bytes();
+        let reached = &self.reached[..self.kept];
+        for &splat in reached {
+            let [first, end, ..] = splat.to_le_bytes();
             next[usize::from(first)] = next[usize::from(first)].wrapping_add(1);
             next[usize::from(end)] = next[usize::from(end)].wrapping_sub(1);
         }
@@ -122,18 +150,19 @@ impl Segment {
         if self.lists.len() < total {
             self.lists.resize(total, 0);
         }
-        for (i, &span) in self.spans.as_flattened().iter().enumerate() {
-            let [first, end] = span.to_le_bytes();
+        for &splat in reached {
+            let [first, end, ..] = splat.to_le_bytes();
+            let i = (splat >> 16) as u16;
             // Most splats reach few blocks. Writing a fixed number of places, and moving on only in the lists that are
             // reached, has no branch to predict; a place past a list's end is its slack.
             for column in first..first + AT_ONCE as u8 {
                 let slot = &mut next[usize::from(column)];
-                self.lists[*slot as usize] = i as u16;
+                self.lists[*slot as usize] = i;
                 *slot += u32::from(column < end);
             }
             for column in first + AT_ONCE as u8..end {
                 let slot = &mut next[usize::from(column)];
-                self.lists[*slot as usize] = i as u16;
+                self.lists[*slot as usize] = i;
                 *slot += 1;
             }
         }

@@ -1,7 +1,7 @@
 //! Second phase: one strip of the image, from the chunks' lists to finished pixels.
 
 use super::bin::{Bins, Entry, STRIP_TILES, STRIP_WIDTH, sort_by_depth, splat_of};
-use super::blend::Block;
+use super::blend::{Block, Pixels};
 use super::lanes::{Kernel, Lanes};
 use super::preprocess::Splat;
 use super::profile::{Clock, Phase};
@@ -22,7 +22,9 @@ pub(super) struct Scratch {
     entries: Vec<Entry>,
     spare: Vec<Entry>,
     segment: Segment,
-    blocks: Vec<Block>,
+    /// Of the strip, band by band; `None` where no splat reached yet.
+    blocks: Vec<Option<Block>>,
+    background: Vec<[f32; 3]>,
     pub(super) clock: Clock,
 }
 
@@ -45,16 +47,16 @@ impl Kernel for DrawStrip<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(mut self, l: L) {
         self.scratch.clock.start();
+        self.fill_background();
+        self.scratch.clock.lap(Phase::Write);
         self.gather();
         if self.scratch.entries.is_empty() {
-            self.fill_background();
-            self.scratch.clock.lap(Phase::Write);
             return;
         }
         sort_by_depth(&mut self.scratch.entries, &mut self.scratch.spare);
         self.scratch.clock.lap(Phase::Sort);
         self.blend(l);
-        self.write();
+        self.write(l);
         self.scratch.clock.lap(Phase::Write);
     }
 }
@@ -72,21 +74,19 @@ impl DrawStrip<'_, '_> {
         let Scratch { entries, segment, blocks, clock, .. } = &mut *self.scratch;
         let left = self.column * STRIP_WIDTH;
         let top = self.row * TILE;
-        let columns = self.rows.colour[0].len().div_ceil(BLOCK);
         blocks.clear();
-        for _ in 0..TILE / BLOCK {
-            blocks.extend((0..COLUMNS).map(|column| Block::new(left + column * BLOCK)));
-        }
+        blocks.resize(COLUMNS * TILE / BLOCK, None);
         for run in entries.chunks(SEGMENT) {
             segment.load(run.iter().map(|&e| self.splats[splat_of(e)]), self.column * STRIP_TILES, top);
             clock.lap(Phase::Bin);
             for (band, blocks) in blocks.chunks_mut(COLUMNS).enumerate() {
                 segment.list_band(l, band);
                 clock.lap(Phase::Bin);
-                for (column, block) in blocks[..columns].iter_mut().enumerate() {
+                for (column, block) in blocks.iter_mut().enumerate() {
                     let list = segment.list(column);
-                    if !list.is_empty() && !block.is_done() {
-                        block.blend(l, top + band * BLOCK, list, &segment.splats);
+                    if !list.is_empty() {
+                        let corner = [left + column * BLOCK, top + band * BLOCK];
+                        block.get_or_insert_with(Block::new).blend(l, corner, list, &segment.splats);
                     }
                 }
                 clock.lap(Phase::Blend);
@@ -95,22 +95,53 @@ impl DrawStrip<'_, '_> {
     }
 
     fn fill_background(&mut self) {
-        self.rows.colour.iter_mut().for_each(|row| row.fill(self.background));
+        let row = &mut self.scratch.background;
+        row.clear();
+        row.resize(STRIP_WIDTH, self.background);
+        self.rows.colour.iter_mut().for_each(|colour| colour.copy_from_slice(&row[..colour.len()]));
         self.rows.alpha.iter_mut().for_each(|row| row.fill(0.0));
         self.rows.depth.iter_mut().for_each(|row| row.fill(0.0));
     }
 
     #[inline(always)]
-    fn write(&mut self) {
-        let blocks = &self.scratch.blocks;
-        for y in 0..TILE {
-            let (band, within) = (y / BLOCK, y % BLOCK);
-            let outputs =
-                self.rows.colour[y].iter_mut().zip(&mut *self.rows.alpha[y]).zip(&mut *self.rows.depth[y]);
-            for (x, ((colour, alpha), depth)) in outputs.enumerate() {
-                let block = &blocks[band * COLUMNS + x / BLOCK];
-                let pixel = block.pixel(within * BLOCK + x % BLOCK, self.background);
-                (*colour, *alpha, *depth) = (pixel.colour, pixel.alpha, pixel.depth);
+    fn write<L: Lanes>(&mut self, l: L) {
+        for (band, blocks) in self.scratch.blocks.chunks(COLUMNS).enumerate() {
+            for (column, block) in blocks.iter().enumerate() {
+                if let Some(block) = block {
+                    let pixels = block.pixels(l, self.background);
+                    pixels.write(&mut self.rows, column * BLOCK, band * BLOCK);
+                }
+            }
+        }
+    }
+}
+
+impl Pixels {
+    /// Writes the part of a block that lies within the image.
+    #[inline(always)]
+    fn write(&self, rows: &mut Rows, left: usize, top: usize) {
+        for row in 0..BLOCK {
+            let at = |i: usize| row * BLOCK + i;
+            let colour = |i: usize| [self.red[at(i)], self.green[at(i)], self.blue[at(i)]];
+            let (Some(colours), Some(alphas), Some(depths)) = (
+                rows.colour[top + row].get_mut(left..),
+                rows.alpha[top + row].get_mut(left..),
+                rows.depth[top + row].get_mut(left..),
+            ) else {
+                return; // below the image
+            };
+            if let (Some(colours), Some(alphas), Some(depths)) = (
+                colours.first_chunk_mut::<BLOCK>(),
+                alphas.first_chunk_mut::<BLOCK>(),
+                depths.first_chunk_mut::<BLOCK>(),
+            ) {
+                *colours = [colour(0), colour(1), colour(2), colour(3)];
+                alphas.copy_from_slice(&self.alpha[at(0)..at(BLOCK)]);
+                depths.copy_from_slice(&self.depth[at(0)..at(BLOCK)]);
+            } else {
+                for i in 0..colours.len() {
+                    (colours[i], alphas[i], depths[i]) = (colour(i), self.alpha[at(i)], self.depth[at(i)]);
+                }
             }
         }
     }

@@ -120,6 +120,12 @@ impl<L: Lanes> Wide<L> {
         Mask { lanes: self.lanes, values: self.lanes.less(self.values, b.values) }
     }
 
+    /// Where `self >= b`.
+    #[inline(always)]
+    pub(super) fn at_least(self, b: Self) -> Mask<L> {
+        Mask { lanes: self.lanes, values: self.lanes.at_least(self.values, b.values) }
+    }
+
     /// Where `0 <= self <= limit`, for positive limits (−0 counts as negative).
     #[inline(always)]
     pub(super) fn in_range(self, limit: Self) -> Mask<L> {
