@@ -1,7 +1,7 @@
 //! The shape of a Gaussian that covers its part of a surface: flat, as wide as the part's second moment in the tangent
 //! plane.
 
-use crate::scene::RestBody;
+use crate::scene::body::vertex_normals;
 use glam::{DMat3, DQuat, DVec3, Vec3};
 
 /// A flat Gaussian on a surface, in the rest pose.
@@ -41,10 +41,11 @@ impl Disc {
 
 /// One disc per vertex: its part is the surface weighted by the vertex's hat function (one at the vertex, linear, zero on
 /// the far edges), so that the parts of all vertices together weigh every point of the surface by one.
-pub(super) fn of_vertices(body: &RestBody, normals: &[DVec3]) -> Vec<Disc> {
-    let mut moments = vec![(DMat3::ZERO, 0.0); body.vertices.len()];
-    for face in &body.faces {
-        let corners = face.map(|i| body.vertices[i as usize]);
+pub(super) fn of_vertices(vertices: &[DVec3], faces: &[[u32; 3]]) -> Vec<Disc> {
+    let normals = vertex_normals(vertices, faces);
+    let mut moments = vec![(DMat3::ZERO, 0.0); vertices.len()];
+    for face in faces {
+        let corners = face.map(|i| vertices[i as usize]);
         let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length() / 2.0;
         for k in 0..3 {
             let (u, v) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
@@ -56,7 +57,7 @@ pub(super) fn of_vertices(body: &RestBody, normals: &[DVec3]) -> Vec<Disc> {
         }
     }
     let disc = |(i, (moment, weight)): (usize, (DMat3, f64))| Disc {
-        centre: body.vertices[i],
+        centre: vertices[i],
         normal: normals[i],
         moment: if weight > 0.0 { moment * weight.recip() } else { DMat3::ZERO },
     };
@@ -64,15 +65,15 @@ pub(super) fn of_vertices(body: &RestBody, normals: &[DVec3]) -> Vec<Disc> {
 }
 
 /// One disc per face, at its centroid, with the second moment of the triangle.
-pub(super) fn of_faces(body: &RestBody) -> Vec<Disc> {
+pub(super) fn of_faces(vertices: &[DVec3], faces: &[[u32; 3]]) -> Vec<Disc> {
     let disc = |face: &[u32; 3]| {
-        let [a, b, c] = face.map(|i| body.vertices[i as usize]);
+        let [a, b, c] = face.map(|i| vertices[i as usize]);
         let centre = (a + b + c) / 3.0;
         let moment =
             [a, b, c].iter().map(|p| outer(*p - centre, *p - centre)).fold(DMat3::ZERO, |s, m| s + m);
         Disc { centre, normal: (b - a).cross(c - a).normalize_or_zero(), moment: moment * (1.0 / 12.0) }
     };
-    body.faces.iter().map(disc).collect()
+    faces.iter().map(disc).collect()
 }
 
 fn outer(a: DVec3, b: DVec3) -> DMat3 {

@@ -2,6 +2,7 @@
 
 use crate::data;
 use crate::scene::SceneError;
+use crate::strategy::StrategyError;
 
 /// An avatar could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -16,6 +17,14 @@ pub enum Error {
         sequence: String,
         /// What is wrong.
         source: SceneError,
+    },
+    /// The avatar cannot be posed.
+    #[error("sequence {sequence}: {source}")]
+    Strategy {
+        /// Id of the sequence.
+        sequence: String,
+        /// What is wrong.
+        source: StrategyError,
     },
     /// A setting out of its range, or data that cannot give an avatar.
     #[error("{field}: {problem}; expected {expected}")]
@@ -36,6 +45,10 @@ impl Error {
         expected: impl Into<String>,
     ) -> Self {
         Self::Invalid { field: field.into(), problem: problem.into(), expected: expected.into() }
+    }
+
+    pub(super) fn strategy(sequence: &data::sequence::Sequence) -> impl Fn(StrategyError) -> Self + '_ {
+        |source| Self::Strategy { sequence: sequence.id.clone(), source }
     }
 
     pub(super) fn scene(sequence: &data::sequence::Sequence) -> impl Fn(SceneError) -> Self + '_ {

@@ -6,7 +6,7 @@ use super::sighting::{Frame, Observation, SurfacePoint};
 use crate::data::sequence::Sequence;
 use crate::math::rotation::nearest_rotation;
 use crate::math::sh;
-use crate::scene::{Image, PosedBody, SkinWeights};
+use crate::scene::{PosedBody, SkinWeights};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -55,6 +55,18 @@ pub(super) struct Colours {
 }
 
 impl Colours {
+    /// As many colours of the same degree, all coefficients zero.
+    pub(super) fn zeroed(&self) -> Self {
+        Self { coefficients: vec![[0.0; 3]; self.coefficients.len()], ..self.clone() }
+    }
+
+    /// Adds the coefficients of a residual.
+    pub(super) fn add(&mut self, residual: &Self) {
+        for (own, more) in self.coefficients.iter_mut().zip(&residual.coefficients) {
+            *own = std::array::from_fn(|c| own[c] + more[c]);
+        }
+    }
+
     pub(super) fn of(&self, part: usize) -> &[[f32; 3]] {
         let count = sh::count(self.degree);
         &self.coefficients[part * count..(part + 1) * count]
@@ -67,38 +79,62 @@ pub(super) struct Gathering<'a> {
     pub(super) degree: usize,
     /// Strength of the pull of degrees 1 to 3 towards zero, relative to the weight of the observations.
     pub(super) smoothness: f64,
+    /// What the coefficients are relative to: 0.5 for colours, 0 for residuals.
+    pub(super) origin: f64,
     /// Observations count less the farther they are from these colours: `1 / (1 + (distance / scale)²)²`.
     pub(super) robust: Option<(&'a Colours, f64)>,
 }
 
-/// Fits every part to what `shown` makes of each frame (its truth, or a residual; colours are then read as offsets from
-/// `origin`).
-pub(super) fn gather(
+impl Gathering<'_> {
+    /// Plain mean colours.
+    pub(super) const MEAN: Self = Self { degree: 0, smoothness: 0.0, origin: 0.5, robust: None };
+}
+
+/// The colours of a sequence's true images: the mean over the frames that show a part, then again with the outliers
+/// weighed down, in SH of `degree`.
+pub(super) fn consensus(
+    sequence: &Sequence,
+    parts: &Parts,
+    degree: usize,
+    smoothness: f64,
+) -> Result<Colours, Error> {
+    let truth = |gathering| {
+        let show = |frame: &Frame<'_>, (): &(), point: &SurfacePoint| frame.observe(point, &frame.truth.rgb);
+        gather(sequence, parts, gathering, |_| Ok(()), show)
+    };
+    let mean = truth(Gathering::MEAN)?;
+    truth(Gathering { degree, smoothness, robust: Some((&mean, ROBUST_SCALE)), ..Gathering::MEAN })
+}
+
+/// Fits every part to what the frames show of it: `prepare` makes of each frame what `observe` then reads at every
+/// surface point.
+pub(super) fn gather<S: Send + Sync>(
     sequence: &Sequence,
     parts: &Parts,
     gathering: Gathering<'_>,
-    origin: f64,
-    shown: impl Fn(&Frame<'_>) -> Result<Image, Error> + Sync,
+    prepare: impl Fn(&Frame<'_>) -> Result<S, Error> + Sync,
+    observe: impl Fn(&Frame<'_>, &S, &SurfacePoint) -> Observation + Sync,
 ) -> Result<Colours, Error> {
     let mut systems = vec![System::new(gathering.degree); parts.len()];
     let frames: Vec<usize> = (0..sequence.frames.len()).collect();
     for batch in frames.chunks(BATCH) {
-        let load = |&index: &usize| -> Result<(Frame<'_>, Image), Error> {
+        let load = |&index: &usize| -> Result<(Frame<'_>, S), Error> {
             let frame = Frame::load(sequence, index)?;
-            let image = shown(&frame)?;
-            Ok((frame, image))
+            let shown = prepare(&frame)?;
+            Ok((frame, shown))
         };
         let loaded: Vec<_> = batch.par_iter().map(load).collect::<Result<_, _>>()?;
-        for (frame, image) in &loaded {
-            let seen: Vec<Observation> = parts.points.par_iter().map(|p| frame.observe(p, image)).collect();
+        for (frame, shown) in &loaded {
+            let seen: Vec<Observation> = parts.points.par_iter().map(|p| observe(frame, shown, p)).collect();
             let eye = frame.camera.position();
             systems.par_iter_mut().enumerate().with_min_len(256).for_each(|(part, system)| {
                 let Some(mut observation) = combined(parts.members(part), &seen) else { return };
                 let basis = basis(parts, part, gathering.degree, &frame.body, eye, &observation);
                 if let Some((colours, scale)) = gathering.robust {
-                    observation.weight *= robust_weight(colours.of(part), &basis, &observation, scale);
+                    observation.weight *=
+                        robust_weight(colours.of(part), &basis, &observation, gathering.origin, scale);
                 }
-                system.add(&basis, &observation, origin);
+                system.add(&basis, &observation, gathering.origin);
             });
         }
     }
@@ -148,10 +184,16 @@ fn basis(
     sh::basis(degree, (nearest_rotation(blend).inverse() * direction).to_array())
 }
 
-fn robust_weight(coefficients: &[[f32; 3]], basis: &[f64; 16], seen: &Observation, scale: f64) -> f32 {
+fn robust_weight(
+    coefficients: &[[f32; 3]],
+    basis: &[f64; 16],
+    seen: &Observation,
+    origin: f64,
+    scale: f64,
+) -> f32 {
     let distance = |c: usize| -> f64 {
         let model: f64 = coefficients.iter().zip(basis).map(|(k, b)| f64::from(k[c]) * b).sum();
-        (f64::from(seen.colour[c]) - 0.5 - model).powi(2)
+        (f64::from(seen.colour[c]) - origin - model).powi(2)
     };
     let squared = (0..3).map(distance).sum::<f64>() / 3.0;
     (1.0 / (1.0 + squared / (scale * scale)).powi(2)) as f32

@@ -1,15 +1,19 @@
 //! Avatars from a body and its training frames. No optimiser yet: what can be gathered from the frames directly.
 //!
-//! [`surface`] makes Gaussians on the body's surface, [`texture`] a texture for the body's own atlas. Both look at the
-//! same thing: where a point of the surface is seen in each frame ([`sighting`]), and which colour explains what was seen
-//! there ([`gather`]).
+//! [`clothing`] moves the body's surface onto the outlines in the masks, [`surface`] makes Gaussians on it, [`texture`] a
+//! texture for the body's own atlas. All three ask the same two questions: where is a point of the surface seen in each
+//! frame (`sighting`), and what explains best what was seen there (`gather`). Frames are loaded a few at a time, in
+//! order; within a frame every point is independent: the avatar has the same bits for any number of threads.
 
+pub mod clothing;
 mod disc;
 mod error;
 mod fill;
 mod gather;
 mod sighting;
 pub mod surface;
+mod tessellation;
 pub mod texture;
+mod training;
 
 pub use error::Error;

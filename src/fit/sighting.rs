@@ -23,6 +23,13 @@ pub(super) struct Observation {
     pub(super) position: Vec3,
 }
 
+impl Observation {
+    /// The point is not seen.
+    pub(super) fn unseen(position: Vec3) -> Self {
+        Self { colour: [0.0; 3], weight: 0.0, position }
+    }
+}
+
 /// Weight of a sight: cosine of the angle between normal and view, to this power. A frontal sight has more pixels per
 /// area and less blur.
 const FACING_POWER: i32 = 2;
@@ -44,12 +51,11 @@ const LEAST_COVERAGE: f32 = 0.5;
 
 /// A frame with its truth and the posed surface in front of its camera.
 pub(super) struct Frame<'a> {
-    pub(super) index: usize,
     pub(super) camera: &'a Camera,
     pub(super) body: PosedBody<'a>,
     pub(super) truth: Truth,
-    depth: VisibleFaces,
-    eye: DVec3,
+    pub(super) depth: VisibleFaces,
+    pub(super) eye: DVec3,
 }
 
 impl<'a> Frame<'a> {
@@ -63,19 +69,13 @@ impl<'a> Frame<'a> {
         let fine = camera.resized(camera.width * OVERSAMPLING, camera.height * OVERSAMPLING);
         let mesh = Mesh::new(&body.mesh().vertices, &sequence.body.faces).map_err(&in_scene)?;
         let depth = visible_faces(&mesh, &fine).map_err(&in_scene)?;
-        Ok(Self { index, camera, truth, depth, eye: camera.position(), body })
+        Ok(Self { camera, truth, depth, eye: camera.position(), body })
     }
 
     /// What `image`, of the frame's size, shows at a surface point.
     pub(super) fn observe(&self, point: &SurfacePoint, image: &Image) -> Observation {
-        let mesh = self.body.mesh();
-        let corners = self.body.rest.faces[point.face as usize].map(|i| i as usize);
-        let mix = |values: &[Vec3]| -> Vec3 {
-            corners.iter().zip(point.barycentric).map(|(&i, b)| values[i] * b).sum()
-        };
-        let position = mix(&mesh.vertices);
-        let unseen = Observation { colour: [0.0; 3], weight: 0.0, position };
-        let normal = mix(&mesh.normals).normalize_or_zero().as_dvec3();
+        let (position, normal) = self.posed(point);
+        let unseen = Observation::unseen(position);
         let facing = normal.dot((self.eye - position.as_dvec3()).normalize_or_zero());
         if facing < LEAST_FACING {
             return unseen;
@@ -89,6 +89,16 @@ impl<'a> Frame<'a> {
         let covered = if coverage < FULL_COVERAGE { BESIDE_OUTLINE } else { 1.0 };
         let weight = facing.powi(FACING_POWER) * trust * covered;
         Observation { colour, weight: weight as f32, position }
+    }
+
+    /// World position and unit normal of a surface point; a zero normal where all faces around it are degenerate.
+    pub(super) fn posed(&self, point: &SurfacePoint) -> (Vec3, DVec3) {
+        let mesh = self.body.mesh();
+        let corners = self.body.rest.faces[point.face as usize].map(|i| i as usize);
+        let mix = |values: &[Vec3]| -> Vec3 {
+            corners.iter().zip(point.barycentric).map(|(&i, b)| values[i] * b).sum()
+        };
+        (mix(&mesh.vertices), mix(&mesh.normals).normalize_or_zero().as_dvec3())
     }
 
     /// Looks at the depth buffer around a point: `None` if it is hidden, less than one beside an edge.

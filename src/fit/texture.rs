@@ -1,19 +1,22 @@
 //! A textured mesh as an avatar: the texture is gathered from the training frames, the triangle rasterizer draws it.
 
-use super::Error;
-use super::gather::{Gathering, Parts, ROBUST_SCALE, gather};
-use super::sighting::{Frame, SurfacePoint};
+use super::gather::{Parts, consensus};
+use super::sighting::SurfacePoint;
 use super::surface;
+use super::{Error, clothing, training};
 use crate::data::sequence::Sequence;
 use crate::math::sh;
 use crate::render::mesh::{Mesh, SamplePattern, Texture, draw, visible_faces};
-use crate::scene::{Camera, Image, PosedBody, Rendered, RestBody, SceneError, Uv};
+use crate::scene::{Camera, Image, Pose, PosedBody, Rendered, RestBody, SceneError, Uv};
 use glam::{DMat4, Vec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
-/// A texture and where it goes on a body.
+/// A body with its clothes on, and a texture for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexturedBody {
+    /// The body, its surface moved onto the outlines of the training frames ([`super::clothing`]).
+    pub body: Arc<RestBody>,
     /// Texture coordinates per face corner.
     pub uv: Uv,
     /// The colours.
@@ -24,20 +27,16 @@ impl TexturedBody {
     /// Draws the body in a pose, over a background.
     ///
     /// # Errors
-    /// A camera that breaks an invariant, or another body than the one that the texture was made for.
+    /// A camera that breaks an invariant, or a pose for another body.
     pub fn draw(
         &self,
-        body: &PosedBody<'_>,
+        pose: &Pose,
         camera: &Camera,
         pattern: SamplePattern,
         background: [f32; 3],
     ) -> Result<Rendered, SceneError> {
-        let faces = &body.rest.faces;
-        if faces.len() != self.uv.faces.len() {
-            let expected = format!("the textured body's {}", self.uv.faces.len());
-            return Err(SceneError::new("faces", format!("{} of them", faces.len()), expected));
-        }
-        let mesh = Mesh::new(&body.mesh().vertices, faces)?;
+        let posed = PosedBody::new(&self.body, pose)?;
+        let mesh = Mesh::new(&posed.mesh().vertices, &self.body.faces)?;
         Ok(draw(&mesh, camera, pattern, self.texture.shader(&self.uv))?.over(background))
     }
 }
@@ -52,31 +51,46 @@ const PRIOR_WEIGHT: f32 = 0.02;
 /// Texels around each chart that repeat its border, so that interpolation never reads an empty texel.
 const GUTTER: usize = 8;
 
-/// Gathers a square texture of `size` texels a side from the frames of a sequence, in the body's own atlas. Each texel is
-/// the robust mean of what the frames show of it; where they show little or nothing, the colour comes from the surface
-/// around it.
+/// How a texture is gathered.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TextureInit {
+    /// Texels along a side.
+    pub size: u32,
+    /// How often the body's outline is brought closer to that of the masks before anything else.
+    pub outline_rounds: usize,
+    /// At most so many training frames are looked at, evenly spread over the sequence.
+    pub most_frames: usize,
+}
+
+impl Default for TextureInit {
+    fn default() -> Self {
+        Self { size: 1024, outline_rounds: 2, most_frames: 64 }
+    }
+}
+
+/// Gathers a square texture from the frames of a sequence, in the body's own atlas. Each texel is the robust mean of what
+/// the frames show of it; where they show little or nothing, the colour comes from the surface around it.
 ///
 /// # Errors
 /// A size of zero or above [`MAX_SIZE`], a body without texture coordinates, a sequence without frames, a frame that
 /// cannot be read.
-pub fn gather_texture(sequence: &Sequence, size: u32) -> Result<TexturedBody, Error> {
+pub fn gather_texture(sequence: &Sequence, init: &TextureInit) -> Result<TexturedBody, Error> {
+    let size = init.size;
     if size == 0 || size > MAX_SIZE {
         return Err(Error::invalid("texture size", size.to_string(), format!("1 to {MAX_SIZE} texels")));
     }
-    let body = &*sequence.body;
-    let Some(uv) = body.uv.clone() else {
+    let training = training::prepared(sequence, init.most_frames)?;
+    let Some(uv) = sequence.body.uv.clone() else {
         let field = format!("sequence {}: body", sequence.id);
         return Err(Error::invalid(field, "no texture coordinates", "uv per face corner (vt and ft)"));
     };
+    let sequence = &clothing::dressed(&training, init.outline_rounds)?;
+    let body = &*sequence.body;
     let coarse = surface::vertex_colours(sequence)?;
     let atlas = Atlas::new(&uv, size).map_err(Error::scene(sequence))?;
     let parts = Parts::single_points(atlas.points);
-    let truth = |frame: &Frame<'_>| Ok(frame.truth.rgb.clone());
-    let mean = Gathering { degree: 0, smoothness: 0.0, robust: None };
-    let first = gather(sequence, &parts, mean, 0.5, truth)?;
-    let robust = Gathering { robust: Some((&first, ROBUST_SCALE)), ..mean };
-    let colours = gather(sequence, &parts, robust, 0.5, truth)?;
-
+    let colours = consensus(sequence, &parts, 0, 0.0)?;
     let texel = |(part, point): (usize, &SurfacePoint)| -> [f32; 3] {
         let own = colours.of(part)[0].map(|c| 0.5 + c * sh::C0 as f32);
         let around = interpolated(body, &coarse, point);
@@ -85,7 +99,7 @@ pub fn gather_texture(sequence: &Sequence, size: u32) -> Result<TexturedBody, Er
     };
     let texels: Vec<[f32; 3]> = parts.points.par_iter().enumerate().map(texel).collect();
     let image = with_gutter(&atlas.pixels, &texels, size as usize).map_err(Error::scene(sequence))?;
-    Ok(TexturedBody { uv, texture: Texture::new(image) })
+    Ok(TexturedBody { body: sequence.body.clone(), uv, texture: Texture::new(image) })
 }
 
 fn interpolated(body: &RestBody, vertex_colours: &[[f32; 3]], point: &SurfacePoint) -> [f32; 3] {
