@@ -34,6 +34,8 @@ fn assert_closed_and_outward(name: &str, body: &RestBody) {
     }
     assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))), "{name}: open edge");
     assert!(volume > 0.0, "{name}: inside out");
+    let euler = body.vertices.len() as i64 - body.faces.len() as i64 / 2;
+    assert_eq!(euler, 2, "{name}: no handles, one piece");
     let used: BTreeSet<u32> = body.faces.iter().flatten().copied().collect();
     assert_eq!(used.len(), body.vertices.len(), "{name}: loose vertices");
 }
@@ -43,8 +45,6 @@ fn default_bodies_are_closed_spheres_of_good_triangles() {
     for (name, subject) in default_subjects() {
         let body = subject.body();
         assert_closed_and_outward(&name, body);
-        let euler = body.vertices.len() as i64 - body.faces.len() as i64 / 2;
-        assert_eq!(euler, 2, "{name}: no handles, one piece");
         if matches!(subject.parameters().rig, Rig::Figure(_)) {
             assert!((5_000..=15_000).contains(&body.vertices.len()), "{name}: {}", body.vertices.len());
         }
@@ -55,7 +55,7 @@ fn default_bodies_are_closed_spheres_of_good_triangles() {
         };
         let mut angles: Vec<f64> = body.faces.iter().map(smallest_angle).collect();
         angles.sort_by(f64::total_cmp);
-        assert!(angles[0] > 7.0, "{name}: worst angle {}", angles[0]);
+        assert!(angles[0] > 5.0, "{name}: worst angle {}", angles[0]);
         assert!(angles[angles.len() / 100] > 14.0, "{name}: 1 % below {}", angles[angles.len() / 100]);
         assert!(angles[angles.len() / 2] > 35.0, "{name}: median {}", angles[angles.len() / 2]);
     }
@@ -394,7 +394,7 @@ fn rig() -> impl Strategy<Value = Rig> {
 
 proptest! {
     // A case builds a body and draws a frame.
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 20, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn any_parameters_give_a_closed_body_and_images_or_a_named_error(
         rig in rig(),
@@ -407,7 +407,10 @@ proptest! {
         let motion = Motion { turns, twist_degrees, bend_degrees, liveliness };
         let parameters = Parameters { rig, capture, motion, seed, resolution: 32, samples: 1, ..Parameters::default() };
         match Subject::new(&parameters) {
-            Err(error) => prop_assert!(!error.field.is_empty()),
+            Err(error) => {
+                // Refused for a range, never for what the mesher made of valid parameters.
+                prop_assert_eq!(parameters.validate().unwrap_err(), error);
+            }
             Ok(subject) => {
                 assert_closed_and_outward("random", subject.body());
                 for sequence in subject.sequences() {
