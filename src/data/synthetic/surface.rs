@@ -49,7 +49,7 @@ impl Warp {
         let one = |lens: &Lens| {
             let offset = point - lens.centre;
             let ratio = offset.length_squared() / (lens.radius * lens.radius);
-            let falloff = (1.0 + ratio * ratio).sqrt().sqrt();
+            let falloff = (1.0 + ratio).sqrt();
             offset * ((1.0 - 1.0 / lens.power) / falloff)
         };
         self.lenses.iter().map(one).sum()
