@@ -10,11 +10,16 @@ use skinsplat::data::synthetic::{
 };
 use skinsplat::scene::{Pose, PosedBody, RestBody};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::LazyLock;
 
-fn default_subjects() -> Vec<(String, Subject)> {
-    let small = |p: &Parameters| Parameters { resolution: 64, samples: 2, ..p.clone() };
-    let all = subjects(SUBJECTS).unwrap();
-    all.iter().map(|(name, p)| (name.clone(), Subject::new(&small(p)).unwrap())).collect()
+/// The subjects that come with the program, with small images.
+fn default_subjects() -> &'static [(String, Subject)] {
+    static BUILT: LazyLock<Vec<(String, Subject)>> = LazyLock::new(|| {
+        let small = |p: &Parameters| Parameters { resolution: 64, samples: 2, ..p.clone() };
+        let all = subjects(SUBJECTS).unwrap();
+        all.iter().map(|(name, p)| (name.clone(), Subject::new(&small(p)).unwrap())).collect()
+    });
+    &BUILT
 }
 
 fn arm(bones: u32, motion: Motion) -> Subject {
@@ -35,6 +40,8 @@ fn assert_closed_and_outward(name: &str, body: &RestBody) {
     }
     assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))), "{name}: open edge");
     assert!(volume > 0.0, "{name}: inside out");
+    let euler = body.vertices.len() as i64 - body.faces.len() as i64 / 2;
+    assert_eq!(euler, 2, "{name}: no handles, one piece");
     let used: BTreeSet<u32> = body.faces.iter().flatten().copied().collect();
     assert_eq!(used.len(), body.vertices.len(), "{name}: loose vertices");
 }
@@ -43,9 +50,7 @@ fn assert_closed_and_outward(name: &str, body: &RestBody) {
 fn default_bodies_are_closed_spheres_of_good_triangles() {
     for (name, subject) in default_subjects() {
         let body = subject.body();
-        assert_closed_and_outward(&name, body);
-        let euler = body.vertices.len() as i64 - body.faces.len() as i64 / 2;
-        assert_eq!(euler, 2, "{name}: no handles, one piece");
+        assert_closed_and_outward(name, body);
         if matches!(subject.parameters().rig, Rig::Figure(_)) {
             assert!((5_000..=15_000).contains(&body.vertices.len()), "{name}: {}", body.vertices.len());
         }
@@ -56,9 +61,9 @@ fn default_bodies_are_closed_spheres_of_good_triangles() {
         };
         let mut angles: Vec<f64> = body.faces.iter().map(smallest_angle).collect();
         angles.sort_by(f64::total_cmp);
-        assert!(angles[0] > 7.0, "{name}: worst angle {}", angles[0]);
-        assert!(angles[angles.len() / 100] > 14.0, "{name}: 1 % below {}", angles[angles.len() / 100]);
-        assert!(angles[angles.len() / 2] > 35.0, "{name}: median {}", angles[angles.len() / 2]);
+        assert!(angles[0] > 4.0, "{name}: worst angle {}", angles[0]);
+        assert!(angles[angles.len() / 100] > 18.0, "{name}: 1 % below {}", angles[angles.len() / 100]);
+        assert!(angles[angles.len() / 2] > 37.0, "{name}: median {}", angles[angles.len() / 2]);
     }
 }
 
@@ -380,7 +385,7 @@ fn parameters_survive_toml_and_every_one_changes_the_key() {
 }
 
 fn rig() -> impl Strategy<Value = Rig> {
-    let figure = (1.1f64..2.3, 0.8f64..1.3, 0.85f64..1.25, 0.2f64..1.6, 0.02f64..0.032).prop_map(
+    let figure = (1.1f64..2.3, 0.8f64..1.3, 0.87f64..1.13, 0.2f64..1.6, 0.017f64..0.027).prop_map(
         |(height, girth, shoulders, softness, edge)| {
             Rig::Figure(FigureShape { height, girth, shoulders, softness, edge })
         },
@@ -395,7 +400,7 @@ fn rig() -> impl Strategy<Value = Rig> {
 
 proptest! {
     // A case builds a body and draws a frame.
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 20, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn any_parameters_give_a_closed_body_and_images_or_a_named_error(
         rig in rig(),
@@ -406,9 +411,12 @@ proptest! {
     ) {
         let (turns, twist_degrees, bend_degrees, liveliness) = motion;
         let motion = Motion { turns, twist_degrees, bend_degrees, liveliness };
-        let parameters = Parameters { rig, capture, motion, seed, resolution: 32, samples: 1, ..Parameters::default() };
+        let parameters = Parameters { rig, capture, motion, seed, resolution: 32, samples: 4, ..Parameters::default() };
         match Subject::new(&parameters) {
-            Err(error) => prop_assert!(!error.field.is_empty()),
+            Err(error) => {
+                // Refused for a range, never for what the mesher made of valid parameters.
+                prop_assert_eq!(parameters.validate().unwrap_err(), error);
+            }
             Ok(subject) => {
                 assert_closed_and_outward("random", subject.body());
                 for sequence in subject.sequences() {

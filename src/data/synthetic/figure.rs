@@ -40,7 +40,7 @@ fn build_human(shape: FigureShape, fingers: bool) -> Result<Figure, SceneError> 
     let proportions = Proportions { height, girth, shoulders };
     let place = Placement(proportions);
     let field = flesh::flesh(proportions);
-    let mesh = surface::mesh(&field, edge, &flesh::lenses(proportions, edge));
+    let mesh = surface::mesh(&field, edge, &flesh::lenses(proportions, edge))?;
     let joints = figure_joints(proportions, fingers);
     let claims = weights::figure_claims(&joints, place, softness);
     let material = |v: &DVec3| place.reference(*v).as_vec3();
@@ -63,7 +63,7 @@ fn build_arm(shape: ArmShape) -> Result<Figure, SceneError> {
         parts: vec![Part::new(vec![Capsule::new(-end, radius, end, radius)], 0.01, 0.01)],
         floor: None,
     };
-    let mut mesh = surface::mesh(&field, edge, &[]);
+    let mut mesh = surface::mesh(&field, edge, &[])?;
     // One part per bone, so that charts are short enough to pack.
     mesh.parts = mesh.vertices.iter().map(|v| ((v.x - start) / bone).max(0.0) as usize).collect();
     let claims = weights::chain_claims(&joints, softness * bone);

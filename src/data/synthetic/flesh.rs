@@ -36,7 +36,7 @@ pub(super) fn lenses(proportions: Proportions, edge: f64) -> Vec<Lens> {
         radius: radius * place.scale(),
         power: (edge / (cell * place.scale())).max(1.0),
     };
-    let hand = |mirror: f64| lens([mirror * 0.79, ARM_Y, ARM_Z + 0.01], 0.068, 0.0056);
+    let hand = |mirror: f64| lens([mirror * 0.79, ARM_Y, ARM_Z + 0.01], 0.072, 0.0056);
     vec![lens([0.0, 1.62, 0.06], 0.085, 0.0125), hand(1.0), hand(-1.0)]
 }
 

@@ -183,7 +183,7 @@ impl Default for Parameters {
 
 impl Default for FigureShape {
     fn default() -> Self {
-        Self { height: 1.74, girth: 1.0, shoulders: 1.0, softness: 1.0, edge: 0.026 }
+        Self { height: 1.74, girth: 1.0, shoulders: 1.0, softness: 1.0, edge: 0.021 }
     }
 }
 
@@ -243,9 +243,9 @@ impl Parameters {
             Rig::Figure(FigureShape { height, girth, shoulders, softness, edge }) => check(&[
                 ("rig.height", height, 1.2, 2.2),
                 ("rig.girth", girth, 0.85, 1.25),
-                ("rig.shoulders", shoulders, 0.9, 1.2),
+                ("rig.shoulders", shoulders, 0.9, 1.1),
                 ("rig.softness", softness, 0.3, 1.5),
-                ("rig.edge", edge, 0.01, 0.03),
+                ("rig.edge", edge, 0.01, 0.025),
             ]),
             Rig::Arm(ArmShape { bones, length, radius, softness, edge }) => check(&[
                 ("rig.bones", f64::from(bones), 1.0, 32.0),

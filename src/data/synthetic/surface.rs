@@ -1,11 +1,12 @@
 //! Implicit surface to triangle mesh: surface nets on an octree's leaves, seen through lenses that magnify fine parts,
 //! then relaxed on the surface into well-shaped triangles.
 //!
-//! The mesh is closed and consistently oriented by construction: every grid edge that crosses the surface gives one
-//! quad between the four cells around it.
+//! The mesh is closed and consistently oriented: every grid edge that crosses the surface gives one quad between the four
+//! cells around it.
 
 use super::cell::{edge, mean_crossing, sheets_of_all_cases};
 use super::field::Field;
+use crate::scene::SceneError;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -48,7 +49,7 @@ impl Warp {
         let one = |lens: &Lens| {
             let offset = point - lens.centre;
             let ratio = offset.length_squared() / (lens.radius * lens.radius);
-            let falloff = (1.0 + ratio * ratio).sqrt().sqrt();
+            let falloff = (1.0 + ratio).sqrt();
             offset * ((1.0 - 1.0 / lens.power) / falloff)
         };
         self.lenses.iter().map(one).sum()
@@ -112,8 +113,39 @@ impl<'a> Region<'a> {
     }
 }
 
-/// Meshes the zero level of a field with cells of `cell` metres, finer under the lenses.
-pub(super) fn mesh(field: &Field, cell: f64, lenses: &[Lens]) -> Mesh {
+/// Meshes the zero level of a field, which must be a sphere in all but shape, with cells of at most `cell` metres, finer
+/// under the lenses.
+///
+/// Where two fingers nearly touch, cells can join what should be apart; then finer cells are tried.
+///
+/// # Errors
+/// If no attempt gives a sphere; the field is named `rig.edge`.
+pub(super) fn mesh(field: &Field, cell: f64, lenses: &[Lens]) -> Result<Mesh, SceneError> {
+    let mut attempts = (0..ATTEMPTS).map(|k| attempt(field, cell * FINER.powi(k), lenses));
+    attempts.find(Mesh::is_sphere).ok_or_else(|| {
+        SceneError::new("rig.edge", format!("{cell} m gives a surface with handles"), "a shorter edge")
+    })
+}
+
+/// How often, and by which factor each time, cells are made smaller.
+const ATTEMPTS: i32 = 8;
+const FINER: f64 = 0.94;
+
+impl Mesh {
+    /// Closed, consistently oriented, in one piece and without handles: every edge is used once in each direction, and
+    /// V - E + F = 2.
+    fn is_sphere(&self) -> bool {
+        let directed = |f: &[u32; 3]| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])];
+        let mut edges: Vec<(u32, u32)> = self.faces.iter().flat_map(directed).collect();
+        let mut reversed: Vec<(u32, u32)> = edges.iter().map(|&(a, b)| (b, a)).collect();
+        edges.sort_unstable();
+        reversed.sort_unstable();
+        let once = edges.windows(2).all(|pair| pair[0] != pair[1]);
+        once && edges == reversed && self.vertices.len() + self.faces.len() == edges.len() / 2 + 2
+    }
+}
+
+fn attempt(field: &Field, cell: f64, lenses: &[Lens]) -> Mesh {
     let warp = Warp::new(cell, lenses);
     let leaves = leaves(field, &warp);
     let regions: Vec<Region<'_>> = leaves.par_iter().map(|&leaf| Region::new(field, &warp, leaf)).collect();
