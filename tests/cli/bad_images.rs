@@ -50,7 +50,9 @@ fn images_that_do_not_go_together() {
     let other = fixture("metrics/png/tiny_11x11_a.png");
     let sizes = ["rocket_67x53_noise_a.png", "tiny_11x11_a.png", "67x53", "11x11"];
     desk.run(args!["score", good, other]).refuses(&sizes, "sizes");
-    desk.run(args!["score", good, good, "--mask", other]).refuses(&["67x53", "11x11"], "mask's size");
+    let mask = skinsplat::scene::Mask::new(11, 11, vec![1.0; 121]).unwrap();
+    skinsplat::data::frames::save_mask_png(&desk.path("mask.png"), &mask).unwrap();
+    desk.run(args!["score", good, good, "--mask", "mask.png"]).refuses(&["67x53", "11x11"], "mask's size");
     desk.run(args!["score", good, good, "--mask", good]).refuses(&["rocket_67x53", "grey mask"], "a colour mask");
     desk.run(args!["score", good, "nothing.png"]).refuses(&["nothing.png", "No such file"], "missing truth");
     desk.run(args!["score", "nothing.png", good]).refuses(&["nothing.png", "No such file"], "missing render");

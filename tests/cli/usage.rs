@@ -9,7 +9,38 @@ const SUBCOMMANDS: [&str; 10] =
 
 #[test]
 fn top_level_help() {
-    insta::assert_snapshot!(Desk::new().ok(args!["-h"]), @"");
+    insta::assert_snapshot!(Desk::new().ok(args!["-h"]), @r#"
+    How should a Gaussian rotate on a skinned body?
+
+    Usage: reproduce [OPTIONS] <COMMAND>
+
+    Commands:
+      run          Evaluate: make avatars, pose, render, score, and write the tables
+      plan         Show what a run would do, without doing it
+      report       Print the tables of a run again, or compare them with a baseline
+      list         List experiments, datasets, strategies, protocols or metrics
+      render       Render a 3DGS PLY, posed or as it stands
+      skin         Pose an avatar and write a plain static 3DGS PLY
+      score        Score renders against truth: two images, or two folders whose frames pair up by name
+      blend        Blend rotations with every solver: check a shader or an engine against the exact
+                   answer
+      inspect      Show what a file or folder holds, and what is wrong with it
+      completions  Print a completion script for a shell
+      help         Print this message or the help of the given subcommand(s)
+
+    Options:
+          --threads <N>  Threads to compute with; results do not depend on it [default:
+                         SLURM_CPUS_PER_TASK, else all cores]
+      -q, --quiet        No progress, no notes: errors only
+      -h, --help         Print help (see more with '--help')
+      -V, --version      Print version
+
+    Exit codes:
+      0  done
+      1  ran, and the verdict is bad (a regression against a baseline)
+      2  could not run: usage, input or disk; one line on stderr says which file and field
+      3  incomplete: some frames failed or are missing from the tables
+    "#);
 }
 
 #[test]
