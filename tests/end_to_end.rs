@@ -131,7 +131,9 @@ fn a_killed_run_goes_on_where_it_stopped() {
     assert_nothing_twice(&keys);
     assert_eq!(keys.len(), 12);
     assert!(rendered(&desk, "killed") < 6, "all frames were rendered again");
-    assert!(contents(&desk.path("killed")).iter().all(|(p, _)| !p.display().to_string().contains(".writing-")));
+    assert!(
+        contents(&desk.path("killed")).iter().all(|(p, _)| !p.display().to_string().contains(".writing-"))
+    );
 }
 
 #[test]
@@ -162,7 +164,9 @@ fn other_settings_redo_only_what_they_change() {
     run(&desk, "run", &["--limit", "2", "--all-strategies"]);
     assert_nothing_twice(&keys(&desk.read("run/frames.jsonl")));
     let page = desk.read("run/tables.md");
-    for preset in skinsplat::strategy::PRESETS.iter().filter(|p| !p.id.ends_with("-original")) {
+    // Those of the table's own variants have a row already.
+    let shown = ["lbs", "quaternion-average"];
+    for preset in skinsplat::strategy::PRESETS.iter().filter(|preset| !shown.contains(&preset.id)) {
         assert!(page.contains(preset.title), "{} in {page}", preset.title);
     }
     desk.put("tiny.toml", TABLE.replace("avatar-v1", "3dgs"));

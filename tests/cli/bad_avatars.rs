@@ -37,15 +37,43 @@ fn avatars_that_are_wrong() {
         (text(&good.clone().set(5, "f_dc_2", "-inf")), vec!["[5", "finite"], "infinite colour"),
         (text(&good.clone().set(1, "rot_0", "0").set(1, "rot_1", "0")), vec!["[1]"], "zero quaternion"),
         (text(&good.clone().set(1, "y", "high")), vec!["y", "high"], "a word"),
-        (text(&good.clone().set(4, "weight_0", "0").set(4, "weight_1", "0")), vec!["weights[4]", "sum 0", "a sum of 1"], "zero weights"),
-        (text(&good.clone().set(4, "weight_0", "0.5")), vec!["weights[4]", "sum 0.75", "a sum of 1"], "weights to 0.75"),
-        (text(&good.clone().set(4, "weight_0", "-0.5").set(4, "weight_1", "1.5")), vec!["weights[4]", "-0.5"], "negative weight"),
+        (
+            text(&good.clone().set(4, "weight_0", "0").set(4, "weight_1", "0")),
+            vec!["weights[4]", "sum 0", "a sum of 1"],
+            "zero weights",
+        ),
+        (
+            text(&good.clone().set(4, "weight_0", "0.5")),
+            vec!["weights[4]", "sum 0.75", "a sum of 1"],
+            "weights to 0.75",
+        ),
+        (
+            text(&good.clone().set(4, "weight_0", "-0.5").set(4, "weight_1", "1.5")),
+            vec!["weights[4]", "-0.5"],
+            "negative weight",
+        ),
         (text(&good.clone().set(4, "joint_0", "-1")), vec!["joint"], "negative joint"),
         (good.header("ascii", 4_000_000_000).into_bytes(), vec!["4000000000"], "4e9 rows, ascii"),
-        (good.header("binary_little_endian", 4_000_000_000).into_bytes(), vec!["4000000000"], "4e9 rows, binary"),
-        (good.header("binary_little_endian", u64::MAX).into_bytes(), vec!["18446744073709551615"], "2^64 rows"),
-        (good.header("binary_middle_endian", 6).into_bytes(), vec!["format", "binary_middle_endian"], "format"),
-        (good.text().replace("element vertex 6", "element vertex -6").into_bytes(), vec!["vertex", "-6"], "negative count"),
+        (
+            good.header("binary_little_endian", 4_000_000_000).into_bytes(),
+            vec!["4000000000"],
+            "4e9 rows, binary",
+        ),
+        (
+            good.header("binary_little_endian", u64::MAX).into_bytes(),
+            vec!["18446744073709551615"],
+            "2^64 rows",
+        ),
+        (
+            good.header("binary_middle_endian", 6).into_bytes(),
+            vec!["format", "binary_middle_endian"],
+            "format",
+        ),
+        (
+            good.text().replace("element vertex 6", "element vertex -6").into_bytes(),
+            vec!["vertex", "-6"],
+            "negative count",
+        ),
         (good.text().replace("element vertex 6", "element vertex 7").into_bytes(), vec!["7"], "a row short"),
         (good.text().replace("property float x", "property quad x").into_bytes(), vec!["quad"], "type"),
     ] {
@@ -114,7 +142,11 @@ fn cameras_that_are_wrong() {
         (with("height", json!(-1)), vec!["-1"], "negative height"),
         (with("cx", Value::Null), vec!["null"], "null"),
         (with("world_to_camera", json!([[1, 0], [0, 1]])), vec!["length 2"], "2x2"),
-        (with("world_to_camera", json!([[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1]])), vec!["world_to_camera"], "singular"),
+        (
+            with("world_to_camera", json!([[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1]])),
+            vec!["world_to_camera"],
+            "singular",
+        ),
         (with("background", json!([1, 1])), vec!["length 2"], "two colours"),
     ] {
         desk.put("bad.json", content);
@@ -125,6 +157,7 @@ fn cameras_that_are_wrong() {
         desk.run(arguments).refuses(&all, what);
         assert!(desk.contents() == before, "{what}: files changed");
     }
-    let index = args!["render", "avatar.ply", "--camera", "camera.json", "--camera-index", "1", "--out", "a.png"];
+    let index =
+        args!["render", "avatar.ply", "--camera", "camera.json", "--camera-index", "1", "--out", "a.png"];
     desk.run(index).refuses(&["camera.json", "--camera-index 1", "below 1"], "index");
 }

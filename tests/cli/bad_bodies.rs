@@ -50,7 +50,11 @@ fn bodies_that_are_wrong() {
         (set("kintree_table", 5, 9.0), vec!["kintree_table[1, 2]", "9"], "joint ids out of order"),
         (reshaped("v_template", vec![6, 2]), vec!["v_template", "[6, 2]", "(V,3)"], "flat vertices"),
         (reshaped("v_template", vec![7, 3]), vec!["[6, 3]", "V = 7"], "a vertex more than weights"),
-        (reshaped("weights", vec![6, 4]), vec!["J = 4"], "a joint more than parents"),
+        (
+            reshaped("kintree_table", vec![2, 4]),
+            vec!["kintree_table", "[2, 4]", "J = 3"],
+            "a joint more than weights",
+        ),
         (reshaped("f", vec![4, 4]), vec!["f", "[4, 4]", "(F,3)"], "quads"),
         (reshaped("weights", vec![6, 0]), vec!["weights"], "no joints at all"),
         (reshaped("kintree_table", vec![3]), vec!["kintree_table", "[3]", "(2,J)"], "parents alone"),
@@ -144,7 +148,8 @@ fn files_cut_off_anywhere() {
 fn absurd_shapes_are_refused_before_they_are_allocated() {
     let desk = Desk::new();
     for shape in [[9_u64, 99_999_999], [u64::MAX, 2], [1 << 40, 3]] {
-        let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", shape[0], shape[1]);
+        let header =
+            format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", shape[0], shape[1]);
         let padded = format!("{header:<117}\n");
         let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
         npy.extend(padded.bytes());

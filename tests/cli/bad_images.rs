@@ -30,14 +30,19 @@ fn images_that_are_wrong() {
     claim.extend(chunk(b"IHDR", &[&size[..], &size[..], &[8, 6, 0, 0, 0]].concat()));
     claim.extend(chunk(b"IDAT", &[0x78, 0x9c, 1]));
     let cuts = [1, 20, 40, good.len() / 2, good.len() - 20].map(|n| (good[..n].to_vec(), "cut off"));
-    let others =
-        [(Vec::new(), "empty"), (b"GIF89a".to_vec(), "another format"), (flipped, "a flipped byte"), (claim, "65,000 pixels a side")];
+    let others = [
+        (Vec::new(), "empty"),
+        (b"GIF89a".to_vec(), "another format"),
+        (flipped, "a flipped byte"),
+        (claim, "65,000 pixels a side"),
+    ];
     for (content, what) in cuts.into_iter().chain(others) {
         desk.put("bad.png", &content);
         let before = desk.contents();
         desk.run(args!["score", "bad.png", fixture(GOOD)]).refuses(&["bad.png", "expected"], what);
         desk.run(args!["score", fixture(GOOD), "bad.png"]).refuses(&["bad.png", "expected"], what);
-        desk.run(args!["score", fixture(GOOD), fixture(GOOD), "--mask", "bad.png"]).refuses(&["bad.png"], what);
+        desk.run(args!["score", fixture(GOOD), fixture(GOOD), "--mask", "bad.png"])
+            .refuses(&["bad.png"], what);
         desk.run(args!["inspect", "bad.png"]).refuses(&["bad.png", "expected"], what);
         assert!(desk.contents() == before, "{what}: files changed");
     }
@@ -53,13 +58,15 @@ fn images_that_do_not_go_together() {
     let mask = skinsplat::scene::Mask::new(11, 11, vec![1.0; 121]).unwrap();
     skinsplat::data::frames::save_mask_png(&desk.path("mask.png"), &mask).unwrap();
     desk.run(args!["score", good, good, "--mask", "mask.png"]).refuses(&["67x53", "11x11"], "mask's size");
-    desk.run(args!["score", good, good, "--mask", good]).refuses(&["rocket_67x53", "grey mask"], "a colour mask");
+    desk.run(args!["score", good, good, "--mask", good])
+        .refuses(&["rocket_67x53", "grey mask"], "a colour mask");
     desk.run(args!["score", good, "nothing.png"]).refuses(&["nothing.png", "No such file"], "missing truth");
     desk.run(args!["score", "nothing.png", good]).refuses(&["nothing.png", "No such file"], "missing render");
     desk.run(args!["score", "nothing", data("blender")]).refuses(&["nothing"], "missing folder");
     desk.run(args!["score", good, fixture("metrics/png")]).refuses(&["rocket_67x53"], "file and folder");
     desk.run(args!["score", fixture("metrics/png"), good]).refuses(&["expected a folder"], "folder and file");
-    desk.run(args!["score", data("blender"), data("blender")]).refuses(&["blender", "no frames"], "no images");
+    desk.run(args!["score", data("blender"), data("blender")])
+        .refuses(&["blender", "no frames"], "no images");
     desk.run(args!["score", good, good, "--protocol", "mine"]).refuses(&["mine", "avatar-v1"], "protocol");
     desk.run(args!["score", good, good, "--protocol", "3dgs+ssim=best"]).refuses(&["best"], "variant");
     desk.run(args!["score", good, good, "--background", "1,1"]).refuses(&["--background", "R,G,B"], "colour");

@@ -26,8 +26,13 @@ fn images_and_avatars() {
     ] {
         let before = desk.contents();
         render(&desk, Path::new(&format!("{name}.png"))).refuses(&parts, what);
-        render(&desk, Path::new(&format!("{name}.npy")).with_extension(if name == "folder" { "png" } else { "npy" }).as_path())
-            .refuses(&parts, what);
+        render(
+            &desk,
+            Path::new(&format!("{name}.npy"))
+                .with_extension(if name == "folder" { "png" } else { "npy" })
+                .as_path(),
+        )
+        .refuses(&parts, what);
         skin(&desk, Path::new(&format!("{name}.ply"))).refuses(&parts, what);
         assert!(desk.contents() == before, "{what}: files changed");
     }

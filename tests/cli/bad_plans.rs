@@ -22,7 +22,11 @@ fn experiments_that_are_wrong() {
         ("id = \"tiny\"", "id = \"other\"", vec!["id", "other"]),
         ("id = \"lbs\"", "id = \"lbs\"\nid = \"lbs\"", vec!["duplicate"]),
         ("protocol = \"avatar-v1\"", "protocol = \"mine\"", vec!["protocol", "mine", "avatar-v1"]),
-        ("strategy = \"lbs\"", "strategy = \"guess\"", vec!["variants[0].strategy", "guess", "quaternion-average"]),
+        (
+            "strategy = \"lbs\"",
+            "strategy = \"guess\"",
+            vec!["variants[0].strategy", "guess", "quaternion-average"],
+        ),
         ("strategy = \"lbs\"\n", "", vec!["variants[0].strategy", "missing"]),
         ("sh_degree = 1", "sh_degree = 7", vec!["variants[0].sh_degree", "7", "0 to 3"]),
         ("sh_degree = 1", "sh_degree = \"high\"", vec!["high"]),
@@ -48,7 +52,8 @@ fn experiments_that_are_wrong() {
     desk.put("tiny.toml", "");
     run(&desk, &[]).refuses(&["tiny.toml"], "empty");
     desk.run(args!["run", "table9", "--out", "run"]).refuses(&["table9", "table1", "table6"], "unknown");
-    desk.run(args!["run", "nothing.toml", "--out", "run"]).refuses(&["nothing.toml", "No such file"], "missing");
+    desk.run(args!["run", "nothing.toml", "--out", "run"])
+        .refuses(&["nothing.toml", "No such file"], "missing");
     desk.put("tiny.toml", TINY);
     run(&desk, &["--subject", "nobody"]).refuses(&["subjects", "nobody", "snapshot_ava"], "subject");
     run(&desk, &["--variant", "nothing"]).refuses(&["variants", "nothing", "skinned"], "variant");

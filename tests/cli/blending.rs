@@ -44,9 +44,7 @@ fn answers_agree_with_the_reference() {
             cases += 1;
             let total: f64 = numbers(&case["weights"]).iter().sum();
             let gap_rel = case["gap_rel"].as_f64().unwrap();
-            for (field, reference) in
-                [("blend", "lbs"), ("eigenvalues", "eigenvalues_desc")]
-            {
+            for (field, reference) in [("blend", "lbs"), ("eigenvalues", "eigenvalues_desc")] {
                 let off = difference(&answer[field], &case[reference], total);
                 assert!(off < ROUNDING, "{name} {field}: {off:e}");
             }
@@ -95,7 +93,8 @@ fn nlerp_agrees_with_the_reference() {
         serde_json::from_str(&desk.ok(args!["blend", fixture("rotation/random.json"), "--format", "json"]))
             .unwrap();
     let mut compared = 0;
-    for (answer, case) in answers.as_array().unwrap().iter().zip(json("rotation/random.json").as_array().unwrap())
+    for (answer, case) in
+        answers.as_array().unwrap().iter().zip(json("rotation/random.json").as_array().unwrap())
     {
         let off = angle(&answer["nlerp_wxyz"], &case["nlerp_maxw_wxyz"]);
         assert!(off < 1e-13, "{}: {off:e}", case["name"]);
@@ -113,7 +112,12 @@ fn text_says_what_is_not_unique() {
             {"name":"half a turn","quats_wxyz":[[1,0,0,0],[0,0,0,2]],"weights":[0.5,0.5]}]"#,
     );
     let text = desk.ok(args!["blend", "cases.json"]);
-    assert!(text.contains("quarter turns\n  average               +0.923879533 +0.000000000 +0.000000000 +0.382683432"), "{text}");
+    assert!(
+        text.contains(
+            "quarter turns\n  average               +0.923879533 +0.000000000 +0.000000000 +0.382683432"
+        ),
+        "{text}"
+    );
     assert_eq!(text.matches("not unique").count(), 1, "{text}");
     assert!(text.contains("undefined: the blend does not span a frame"), "{text}");
 }
@@ -126,7 +130,10 @@ fn cases_that_mean_nothing_are_named() {
         ("{}", vec!["cases.json", "sequence"]),
         (r#"[{"name":"a","quats_wxyz":[[1,0,0]],"weights":[1]}]"#, vec!["cases.json", "length 3", "4"]),
         (r#"[{"name":"a","quats_wxyz":[[1,0,0,0]]}]"#, vec!["cases.json", "weights"]),
-        (r#"[{"name":"a","quats_wxyz":[[1,0,0,0]],"weights":[1,2]}]"#, vec!["case 0 `a`", "1 quats_wxyz and 2 weights", "expected"]),
+        (
+            r#"[{"name":"a","quats_wxyz":[[1,0,0,0]],"weights":[1,2]}]"#,
+            vec!["case 0 `a`", "1 quats_wxyz and 2 weights", "expected"],
+        ),
         (r#"[{"name":"a","quats_wxyz":[],"weights":[]}]"#, vec!["case 0 `a`", "at least one"]),
         (r#"[{"name":"a","quats_wxyz":[[0,0,0,0]],"weights":[1]}]"#, vec!["case 0 `a`", "expected finite"]),
         (r#"[{"name":"a","quats_wxyz":[[1,0,0,0]],"weights":[0]}]"#, vec!["case 0 `a`", "not all 0"]),

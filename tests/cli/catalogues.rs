@@ -16,19 +16,31 @@ fn inspect_tells_what_each_kind_of_file_holds() {
     for (path, parts) in [
         (fixture("raster/scene_S.ply"), vec!["3DGS PLY", "10000", "SH degree            3", "static scene"]),
         (desk.path("avatar.ply"), vec!["3DGS PLY", "joint weights, up to 2 per Gaussian"]),
-        (desk.path("body.npz"), vec!["npz archive", "body model", "v_template           [6, 3] <f4", "zero-area faces      0"]),
+        (
+            desk.path("body.npz"),
+            vec!["npz archive", "body model", "v_template           [6, 3] <f4", "zero-area faces      0"],
+        ),
         (data("blender/models/anny_smpl24.npz"), vec!["13492", "26972", "shape directions     10", "pelvis"]),
         (desk.path("poses.npz"), vec!["npz archive", "thetas", "poses                2"]),
         (sequence.join("cameras.npz"), vec!["npz archive", "camera 0             512x512, focal 799.0"]),
         (sequence.join("transforms.json"), vec!["cameras", "512x512", "poses                3"]),
         (fixture("raster/front_512.json"), vec!["cameras", "512x512, focal 703.4 703.4"]),
-        (data("blender/models/ava_smplx55_8inf.glb"), vec!["body model", "joints               55", "clip hands           40 keys"]),
+        (
+            data("blender/models/ava_smplx55_8inf.glb"),
+            vec!["body model", "joints               55", "clip hands           40 keys"],
+        ),
         (sequence.join("images/image_0000.png"), vec!["image", "512x512", "alpha"]),
         (fixture("raster/S_front_512_image.npy"), vec!["image", "512x512"]),
         (subject, vec!["subject", "monocular", "test_twist           3 frames, 3 poses, 1 cameras"]),
         (data("blender"), vec!["folder of subjects", "multiview_ben", "xhands_ava", "snapshot_ava"]),
-        (desk.path("run/results.json"), vec!["results of a run", "tiny", "2 sequences, protocol avatar-v1@1", "missing scores       0"]),
-        (desk.path("run/frames.jsonl"), vec!["results store", "records              4", "failed               0"]),
+        (
+            desk.path("run/results.json"),
+            vec!["results of a run", "tiny", "2 sequences, protocol avatar-v1@1", "missing scores       0"],
+        ),
+        (
+            desk.path("run/frames.jsonl"),
+            vec!["results store", "records              4", "failed               0"],
+        ),
     ] {
         let text = desk.ok(args!["inspect", path]);
         assert!(text.starts_with(&format!("{}\n", path.display())), "{text}");
@@ -71,7 +83,10 @@ fn list_names_everything_that_can_be_chosen() {
     ] {
         let text = desk.ok(args!["list", what]);
         for id in ids {
-            assert!(text.lines().any(|line| line.starts_with(&format!("{id} "))), "{what}: no {id} in {text}");
+            assert!(
+                text.lines().any(|line| line.starts_with(&format!("{id} "))),
+                "{what}: no {id} in {text}"
+            );
         }
     }
     let here = desk.ok(args!["list", "datasets", "--data", data("blender")]);
@@ -79,7 +94,11 @@ fn list_names_everything_that_can_be_chosen() {
     assert!(here.lines().all(|line| line.ends_with("available")), "{here}");
     // What is listed as a strategy can be asked for by that spec.
     for preset in skinsplat::strategy::PRESETS {
-        assert!(preset.strategy.to_string().parse::<skinsplat::strategy::Strategy>().is_ok(), "{}", preset.id);
+        assert!(
+            preset.strategy.to_string().parse::<skinsplat::strategy::Strategy>().is_ok(),
+            "{}",
+            preset.id
+        );
     }
 }
 
@@ -90,7 +109,10 @@ fn a_plan_counts_what_is_left_and_touches_nothing() {
     let plan = args!["plan", "tiny.toml", "--out", "run", "--limit", "1"];
     let before = desk.contents();
     let text = desk.ok(plan.clone());
-    assert!(text.contains("tiny: 2 sequences, 2 variants, 2 frames, protocol avatar-v1@1, on Blender"), "{text}");
+    assert!(
+        text.contains("tiny: 2 sequences, 2 variants, 2 frames, protocol avatar-v1@1, on Blender"),
+        "{text}"
+    );
     assert!(text.ends_with("1 avatars\n2 frames, 2 of them still to do\n"), "{text}");
     assert!(desk.contents() == before);
 

@@ -10,8 +10,7 @@ pub(super) type Field = (&'static str, Vec<u64>, Vec<f32>);
 
 /// A chain of three joints and a strip of four faces along it.
 pub(super) fn body() -> Vec<Field> {
-    let vertices: Vec<f32> =
-        (0..6).flat_map(|i| [0.1 * (i % 2) as f32, 0.2 * (i / 2) as f32, 0.0]).collect();
+    let vertices: Vec<f32> = (0..6).flat_map(|i| [0.1 * (i % 2) as f32, 0.2 * (i / 2) as f32, 0.0]).collect();
     let mut weights = vec![0.0; 18];
     for vertex in 0..6 {
         weights[vertex * 3 + vertex / 2] = 0.75;
@@ -48,13 +47,8 @@ pub(super) fn without(mut fields: Vec<Field>, name: &str) -> Vec<Field> {
 pub(super) fn write_npz(path: &Path, fields: &[Field]) -> PathBuf {
     let mut archive = NpzWriter::create(path).unwrap();
     for (name, shape, values) in fields {
-        let mut writer = archive
-            .array(name, Default::default())
-            .unwrap()
-            .default_dtype()
-            .shape(shape)
-            .begin_nd()
-            .unwrap();
+        let mut writer =
+            archive.array(name, Default::default()).unwrap().default_dtype().shape(shape).begin_nd().unwrap();
         writer.extend(values.iter().copied()).unwrap();
         writer.finish().unwrap();
     }
@@ -72,8 +66,7 @@ impl Ply {
     /// Six Gaussians of degree 0, one at each vertex of [`body`], bound to the joints.
     pub(super) fn bound() -> Self {
         let names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 weight_0 weight_1";
-        let mut properties: Vec<_> =
-            names.split(' ').map(|n| ("float".to_owned(), n.to_owned())).collect();
+        let mut properties: Vec<_> = names.split(' ').map(|n| ("float".to_owned(), n.to_owned())).collect();
         properties.extend(["joint_0", "joint_1"].map(|n| ("ushort".to_owned(), n.to_owned())));
         let row = |i: usize| {
             let [x, y] = [0.1 * (i % 2) as f32, 0.2 * (i / 2) as f32];

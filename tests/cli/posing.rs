@@ -124,7 +124,8 @@ fn a_strategy_that_no_static_file_can_hold_says_so() {
 fn every_preset_poses_a_small_avatar() {
     let desk = made_up::desk();
     for preset in skinsplat::strategy::PRESETS {
-        let posing = args!["--body", "body.npz", "--poses", "poses.npz", "--frame", "1", "--strategy", preset.id];
+        let posing =
+            args!["--body", "body.npz", "--poses", "poses.npz", "--frame", "1", "--strategy", preset.id];
         let mut skin = args!["skin", "avatar.ply", "--out", "posed.ply"];
         skin.extend(posing.clone());
         desk.ok(skin);
@@ -134,7 +135,8 @@ fn every_preset_poses_a_small_avatar() {
     }
     // Without poses: at rest.
     desk.ok(args!["skin", "avatar.ply", "--body", "body.npz", "--out", "rest.ply"]);
-    let [rest, canonical] = ["rest.ply", "avatar.ply"].map(|name| ply::read_avatar(&desk.path(name)).unwrap());
+    let [rest, canonical] =
+        ["rest.ply", "avatar.ply"].map(|name| ply::read_avatar(&desk.path(name)).unwrap());
     for (a, b) in rest.gaussians.means.iter().zip(&canonical.gaussians.means) {
         assert!(a.distance(*b) < 1e-6, "{a} {b}");
     }

@@ -16,7 +16,8 @@ fn finished() -> Desk {
 #[test]
 fn a_report_repeats_the_files_of_the_run() {
     let desk = finished();
-    for (format, file) in [("markdown", "run/tables.md"), ("csv", "run/tiny.csv"), ("latex", "run/tiny.tex")] {
+    for (format, file) in [("markdown", "run/tables.md"), ("csv", "run/tiny.csv"), ("latex", "run/tiny.tex")]
+    {
         assert_eq!(desk.ok(args!["report", "run", "--format", format]), desk.read(file), "{format}");
     }
     assert_eq!(desk.ok(args!["report", "run/results.json"]), desk.read("run/tables.md"));
@@ -24,7 +25,10 @@ fn a_report_repeats_the_files_of_the_run() {
     let tables: Value = serde_json::from_str(&desk.ok(args!["report", "run", "--format", "json"])).unwrap();
     let results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
     assert_eq!(tables, Value::Array(vec![results["tables"][0]["table"].clone()]));
-    assert!(desk.read("run/tables.md").contains("Partial: at most 1 frame per sequence."), "a subset is marked");
+    assert!(
+        desk.read("run/tables.md").contains("Partial: at most 1 frame per sequence."),
+        "a subset is marked"
+    );
 }
 
 #[test]
@@ -61,7 +65,10 @@ fn a_worse_result_is_exit_code_1() {
 #[test]
 fn an_incomplete_run_is_exit_code_3() {
     let desk = Desk::new();
-    desk.put("tiny.toml", include_str!("tiny.toml").replace("sequences = [\"snapshot_ava\"]", "sequences = [\"nobody\"]"));
+    desk.put(
+        "tiny.toml",
+        include_str!("tiny.toml").replace("sequences = [\"snapshot_ava\"]", "sequences = [\"nobody\"]"),
+    );
     let answer = desk.run(args!["run", "tiny.toml", "--out", "run"]).exits(3, "no such subject");
     assert!(answer.err.contains("no frame"), "{}", answer.err);
     assert!(desk.read("run/tables.md").contains("no subject \\`nobody\\`"));
@@ -82,7 +89,12 @@ fn what_is_no_result_is_named() {
         (changed(|r| r["schema"] = Value::from(99)), vec!["bad.json", "schema", "99"]),
         (changed(|r| r["tables"] = Value::from("none")), vec!["bad.json", "expected a sequence"]),
         (changed(|r| r["extra"] = Value::from(1)), vec!["bad.json", "extra"]),
-        (changed(|r| r["tables"][0]["sequences"][0]["variants"][0]["summary"]["psnr"] = Value::from("high")), vec!["bad.json"]),
+        (
+            changed(|r| {
+                r["tables"][0]["sequences"][0]["variants"][0]["summary"]["psnr"] = Value::from("high")
+            }),
+            vec!["bad.json"],
+        ),
         (desk.read("run/results.json")[..400].to_owned(), vec!["bad.json", "line"]),
     ] {
         desk.put("bad.json", &content);

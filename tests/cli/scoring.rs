@@ -97,7 +97,8 @@ fn frames_without_a_partner_are_named() {
     std::fs::copy(desk.path("renders/a.png"), desk.path("truths/d.png")).unwrap();
     desk.run(args!["score", "renders", "truths"]).refuses(&["truths", "frames d", "renders"], "more truths");
     std::fs::copy(desk.path("renders/a.png"), desk.path("renders/a.npy")).unwrap();
-    desk.run(args!["score", "renders", "truths"]).refuses(&["a.png", "a.npy", "one image per frame"], "twice");
+    desk.run(args!["score", "renders", "truths"])
+        .refuses(&["a.png", "a.npy", "one image per frame"], "twice");
 }
 
 #[test]
@@ -106,7 +107,8 @@ fn masks_add_variants() {
     let [a, b] = ["a", "b"].map(|side| fixture(&format!("metrics/png/checker_64x72_inverted_{side}.png")));
     let plain = score(&desk, args![a, b]);
     let size = skinsplat::data::frames::load_image(&a).unwrap().0;
-    let half: Vec<f32> = (0..size.pixels().len()).map(|i| f32::from(i % size.width() < size.width() / 2)).collect();
+    let half: Vec<f32> =
+        (0..size.pixels().len()).map(|i| f32::from(i % size.width() < size.width() / 2)).collect();
     let mask = skinsplat::scene::Mask::new(size.width(), size.height(), half).unwrap();
     skinsplat::data::frames::save_mask_png(&desk.path("mask.png"), &mask).unwrap();
     let masked = score(&desk, args![a, b, "--mask", "mask.png"]);

@@ -116,16 +116,20 @@ fn a_closed_pipe_is_no_error() {
         .map(|i| serde_json::json!({ "name": i.to_string(), "quats_wxyz": [[1, 0, 0, 0]], "weights": [1] }))
         .collect();
     desk.put("many.json", serde_json::to_string(&many).unwrap());
-    for arguments in [args!["blend", "many.json"], args!["list", "metrics"], args!["--help"], args!["completions", "bash"]] {
+    for arguments in
+        [args!["blend", "many.json"], args!["list", "metrics"], args!["--help"], args!["completions", "bash"]]
+    {
         let what = format!("{arguments:?}");
-        let mut child = desk.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child =
+            desk.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         let output = child.wait_with_output().unwrap();
         let err = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success() && err.is_empty(), "{what}: {} {err}", output.status);
     }
     // Through a shell, as people type it.
-    let script = format!("set -o pipefail; '{}' blend many.json | head -n 1", env!("CARGO_BIN_EXE_reproduce"));
+    let script =
+        format!("set -o pipefail; '{}' blend many.json | head -n 1", env!("CARGO_BIN_EXE_reproduce"));
     let output = Command::new("bash").args(["-c", &script]).current_dir(desk.path("")).output().unwrap();
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
