@@ -11,8 +11,9 @@ use std::path::PathBuf;
 /// Blend rotations with every solver: check a shader or an engine against the exact answer.
 ///
 /// CASES.json is a list of {"name", "quats_wxyz": [[w,x,y,z], ...], "weights": [...]} (other keys are ignored).
-/// Quaternions are normalised first, weights need not sum to one. Each answer has its component of largest magnitude
-/// positive, except the raw conversion, which is as PyTorch3D returns it.
+/// Quaternions are normalised first. Weights need not sum to one: the blend, its raw conversion, the eigenvalues and
+/// their gap are those of the weights as given; no other answer depends on the sum. Each answer has its component of
+/// largest magnitude positive, except the raw conversion, which is as PyTorch3D returns it.
 #[derive(Debug, clap::Args)]
 pub(super) struct Blend {
     /// The cases
@@ -48,10 +49,10 @@ struct Answer {
     /// 15 power steps from (1, 1, 1, 1)/2.
     power15_ones_wxyz: [f64; 4],
     nlerp_wxyz: [f64; 4],
-    /// The linear blend Σ w R(q) / Σ w.
+    /// The linear blend Σ w R(q).
     blend: [f64; 9],
     blend_determinant: f64,
-    /// Of Σ w q qᵀ / Σ w, descending.
+    /// Of Σ w q qᵀ, descending.
     eigenvalues: [f64; 4],
     /// λ1 − λ2.
     gap: f64,
@@ -93,41 +94,55 @@ fn solve(case: &Case) -> Result<Answer> {
         average_rotation(quats, weights, solver).ok_or_else(|| anyhow::anyhow!("{solver} found no answer"))
     };
     let power = |start| by(Solver::Power { steps: 15, start });
-    let (blend, outer) = moments(quats, weights);
-    let eigenvalues = SymmetricEigen::new(outer).values;
-    let gap = eigenvalues[0] - eigenvalues[1];
+    // Of weights that sum to one, where nothing overflows; then as given.
+    let Moments { mean, outer, total } = Moments::of(quats, weights);
+    let shares = SymmetricEigen::new(outer).values;
+    let gap = shares[0] - shares[1];
+    let blend = mean.map(|row| row.map(|v| v * total));
     Ok(Answer {
         name: case.name.clone(),
         average_wxyz: exact.quat,
         polar_wxyz: by(Solver::Polar)?,
-        gram_schmidt_columns: rotation::gram_schmidt_columns(blend).map(flat),
-        gram_schmidt_rows: rotation::gram_schmidt_rows(blend).map(flat),
+        gram_schmidt_columns: rotation::gram_schmidt_columns(mean).map(flat),
+        gram_schmidt_rows: rotation::gram_schmidt_rows(mean).map(flat),
         matrix_to_quaternion_raw_wxyz: rotation::matrix_to_quaternion_raw(blend),
         power15_wxyz: power(Start::Heaviest)?,
         power15_ones_wxyz: power(Start::Ones)?,
         nlerp_wxyz: by(Solver::Nlerp)?,
         blend: flat(blend),
         blend_determinant: matrix3::determinant(blend),
-        eigenvalues,
-        gap,
-        gap_rel: gap / eigenvalues[0],
+        eigenvalues: shares.map(|share| share * total),
+        gap: gap * total,
+        gap_rel: gap / shares[0],
         unique: exact.unique,
     })
 }
 
-/// Σ w R(q) / Σ w and Σ w q qᵀ / Σ w, of checked input.
-fn moments(quats: &[[f64; 4]], weights: &[f64]) -> (Matrix3<f64>, [[f64; 4]; 4]) {
-    let heaviest = weights.iter().copied().fold(0.0, f64::max);
-    let total: f64 = weights.iter().map(|w| w / heaviest).sum();
-    let (mut blend, mut outer) = ([[0.0; 3]; 3], [[0.0; 4]; 4]);
-    for (&q, w) in quats.iter().zip(weights) {
-        let share = w / heaviest / total;
-        let Some(q) = rotation::normalize(q).filter(|_| share > 0.0) else { continue };
-        let r = rotation::quaternion_to_matrix(q);
-        (0..3).for_each(|i| (0..3).for_each(|j| blend[i][j] += share * r[i][j]));
-        (0..4).for_each(|i| (0..4).for_each(|j| outer[i][j] += share * q[i] * q[j]));
+/// The moments of weighted rotations.
+struct Moments {
+    /// Σ w R(q) / Σ w.
+    mean: Matrix3<f64>,
+    /// Σ w q qᵀ / Σ w.
+    outer: [[f64; 4]; 4],
+    /// Σ w.
+    total: f64,
+}
+
+impl Moments {
+    /// Of checked input.
+    fn of(quats: &[[f64; 4]], weights: &[f64]) -> Self {
+        let heaviest = weights.iter().copied().fold(0.0, f64::max);
+        let total: f64 = weights.iter().map(|w| w / heaviest).sum();
+        let (mut mean, mut outer) = ([[0.0; 3]; 3], [[0.0; 4]; 4]);
+        for (&q, w) in quats.iter().zip(weights) {
+            let share = w / heaviest / total;
+            let Some(q) = rotation::normalize(q).filter(|_| share > 0.0) else { continue };
+            let r = rotation::quaternion_to_matrix(q);
+            (0..3).for_each(|i| (0..3).for_each(|j| mean[i][j] += share * r[i][j]));
+            (0..4).for_each(|i| (0..4).for_each(|j| outer[i][j] += share * q[i] * q[j]));
+        }
+        Self { mean, outer, total: total * heaviest }
     }
-    (blend, outer)
 }
 
 fn flat(m: Matrix3<f64>) -> [f64; 9] {

@@ -18,6 +18,7 @@ mod score;
 mod selection;
 mod skin;
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use exit::Exit;
 use std::process::ExitCode;
@@ -73,23 +74,43 @@ impl Context {
 
 /// Parses the command line and runs the subcommand.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return answered(&error),
+    };
     let result = set_threads(cli.threads).and_then(|()| cli.command.run(Context { quiet: cli.quiet }));
     match result {
         Ok(exit) => exit.into(),
         Err(error) if output::is_broken_pipe(&error) => Exit::Success.into(),
         Err(error) => {
-            report_error(&error);
+            report_error(&one_line(&format!("{error:#}")));
             Exit::Unusable.into()
         }
     }
 }
 
-/// One line, whatever the messages of the libraries below look like.
+/// Help and versions as they are asked for; wrong usage as one line.
+fn answered(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        // A reader that went away is no error, and nobody is left to be told of another.
+        let _ = error.print();
+        return if error.use_stderr() { Exit::Unusable } else { Exit::Success }.into();
+    }
+    let text = error.render().to_string();
+    let parts = text.split("\n\n").filter(|part| !part.starts_with("For more information"));
+    let line = parts.map(one_line).collect::<Vec<_>>().join("; ");
+    report_error(line.trim_start_matches("error: "));
+    Exit::Unusable.into()
+}
+
 #[allow(clippy::print_stderr, reason = "the one place that writes errors")]
-fn report_error(error: &anyhow::Error) {
-    let line: Vec<String> = format!("{error:#}").split_whitespace().map(str::to_owned).collect();
-    eprintln!("error: {}", line.join(" "));
+fn report_error(text: &str) {
+    eprintln!("error: {text}");
+}
+
+/// One line, whatever the messages of the libraries below look like.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 impl Command {

@@ -1,6 +1,6 @@
 //! Standard output: written in one place, so that a closed pipe (`| head`) ends the program quietly.
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use std::io::Write;
 
 /// Writes text to standard output.
@@ -9,8 +9,7 @@ use std::io::Write;
 /// As the pipe or file behind it; a broken pipe is recognised by [`is_broken_pipe`].
 pub(super) fn emit(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    Ok(out.flush()?)
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).context("standard output: cannot write")
 }
 
 /// True if the reader of our output went away, which is no error.

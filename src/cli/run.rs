@@ -91,7 +91,11 @@ impl Run {
             context.note(format!("{missing} scores are missing; {out}/{FILE_NAME} says why"));
             return Ok(Exit::Incomplete);
         }
-        Ok(if planned.plan.jobs.is_empty() { Exit::Incomplete } else { Exit::Success })
+        if planned.plan.jobs.is_empty() {
+            context.note("no frame was selected: none of the experiments has data here");
+            return Ok(Exit::Incomplete);
+        }
+        Ok(Exit::Success)
     }
 }
 

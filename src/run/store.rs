@@ -117,8 +117,7 @@ impl Store {
     pub fn open(path: &Path, plan: &str) -> Result<Self, Error> {
         let io = |source| Error::Io { path: path.into(), source };
         let mut file = OpenOptions::new().read(true).append(true).create(true).open(path).map_err(io)?;
-        let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(io)?;
+        let bytes = whole(&mut file).map_err(io)?;
         let contents = parse(&bytes, path)?;
         if contents.whole < bytes.len() as u64 {
             cut(path, contents.whole).map_err(io)?;
@@ -177,6 +176,16 @@ impl Store {
     }
 }
 
+/// The bytes of a regular file. A device can neither be cut off nor read to its end.
+fn whole(file: &mut File) -> io::Result<Vec<u8>> {
+    if !file.metadata()?.is_file() {
+        return Err(io::Error::other("not a regular file; expected one to which records can be appended"));
+    }
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
 /// Cuts a file off after a number of bytes.
 fn cut(path: &Path, length: u64) -> io::Result<()> {
     OpenOptions::new().write(true).open(path)?.set_len(length)
@@ -187,7 +196,8 @@ fn cut(path: &Path, length: u64) -> io::Result<()> {
 /// # Errors
 /// If the file cannot be read, is not a store, or holds two results for one key.
 pub fn read(path: &Path) -> Result<Records, Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    let bytes = File::open(path).and_then(|mut file| whole(&mut file));
+    let bytes = bytes.map_err(|source| Error::Io { path: path.into(), source })?;
     Ok(parse(&bytes, path)?.records)
 }
 

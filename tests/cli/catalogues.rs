@@ -1,0 +1,130 @@
+//! `inspect`, `list` and `plan`.
+
+use crate::args;
+use crate::made_up;
+use crate::program::Desk;
+use crate::support::{data, fixture};
+use serde_json::Value;
+
+#[test]
+fn inspect_tells_what_each_kind_of_file_holds() {
+    let desk = made_up::desk();
+    desk.put("tiny.toml", include_str!("tiny.toml"));
+    desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1"]);
+    let subject = data("blender/datasets/snapshot_ava");
+    let sequence = subject.join("test_twist");
+    for (path, parts) in [
+        (fixture("raster/scene_S.ply"), vec!["3DGS PLY", "10000", "SH degree            3", "static scene"]),
+        (desk.path("avatar.ply"), vec!["3DGS PLY", "joint weights, up to 2 per Gaussian"]),
+        (
+            desk.path("body.npz"),
+            vec!["npz archive", "body model", "v_template           [6, 3] <f4", "zero-area faces      0"],
+        ),
+        (data("blender/models/anny_smpl24.npz"), vec!["13492", "26972", "shape directions     10", "pelvis"]),
+        (desk.path("poses.npz"), vec!["npz archive", "thetas", "poses                2"]),
+        (sequence.join("cameras.npz"), vec!["npz archive", "camera 0             512x512, focal 799.0"]),
+        (sequence.join("transforms.json"), vec!["cameras", "512x512", "poses                3"]),
+        (fixture("raster/front_512.json"), vec!["cameras", "512x512, focal 703.4 703.4"]),
+        (
+            data("blender/models/ava_smplx55_8inf.glb"),
+            vec!["body model", "joints               55", "clip hands           40 keys"],
+        ),
+        (sequence.join("images/image_0000.png"), vec!["image", "512x512", "alpha"]),
+        (fixture("raster/S_front_512_image.npy"), vec!["image", "512x512"]),
+        (subject, vec!["subject", "monocular", "test_twist           3 frames, 3 poses, 1 cameras"]),
+        (data("blender"), vec!["folder of subjects", "multiview_ben", "xhands_ava", "snapshot_ava"]),
+        (
+            desk.path("run/results.json"),
+            vec!["results of a run", "tiny", "2 sequences, protocol avatar-v1@1", "missing scores       0"],
+        ),
+        (
+            desk.path("run/frames.jsonl"),
+            vec!["results store", "records              4", "failed               0"],
+        ),
+    ] {
+        let text = desk.ok(args!["inspect", path]);
+        assert!(text.starts_with(&format!("{}\n", path.display())), "{text}");
+        for part in parts {
+            assert!(text.contains(part), "no `{part}` in {text}");
+        }
+    }
+}
+
+#[test]
+fn inspect_refuses_what_it_does_not_know() {
+    let desk = Desk::new();
+    desk.put("notes.txt", "x");
+    desk.put("other.json", "{}");
+    desk.put("broken.json", "{");
+    desk.put("frames.jsonl", "{\"frame\":1}\n");
+    desk.put("empty/readme.txt", "x");
+    for (path, parts) in [
+        ("notes.txt", vec!["notes.txt", "expected .ply"]),
+        ("other.json", vec!["other.json"]),
+        ("broken.json", vec!["broken.json", "line 1"]),
+        ("frames.jsonl", vec!["frames.jsonl:1", "not a results store"]),
+        ("empty", vec!["empty", "datasets", "expected subjects"]),
+        ("nothing.ply", vec!["nothing.ply", "No such file"]),
+        ("nothing", vec!["nothing"]),
+    ] {
+        desk.run(args!["inspect", path]).refuses(&parts, path);
+    }
+}
+
+#[test]
+fn list_names_everything_that_can_be_chosen() {
+    let desk = Desk::new();
+    for (what, ids) in [
+        ("experiments", vec!["table1", "table6"]),
+        ("datasets", vec!["synthetic", "snapshot_ava", "neuman"]),
+        ("strategies", skinsplat::strategy::PRESETS.iter().map(|p| p.id).collect()),
+        ("protocols", skinsplat::metrics::PROTOCOLS.iter().map(|p| p.id.as_str()).collect()),
+        ("metrics", vec!["psnr", "ssim_zero_pad", "psnr_mean_of_channels_mask"]),
+    ] {
+        let text = desk.ok(args!["list", what]);
+        for id in ids {
+            assert!(
+                text.lines().any(|line| line.starts_with(&format!("{id} "))),
+                "{what}: no {id} in {text}"
+            );
+        }
+    }
+    let here = desk.ok(args!["list", "datasets", "--data", data("blender")]);
+    assert_eq!(here.lines().count(), 3, "{here}");
+    assert!(here.lines().all(|line| line.ends_with("available")), "{here}");
+    // What is listed as a strategy can be asked for by that spec.
+    for preset in skinsplat::strategy::PRESETS {
+        assert!(
+            preset.strategy.to_string().parse::<skinsplat::strategy::Strategy>().is_ok(),
+            "{}",
+            preset.id
+        );
+    }
+}
+
+#[test]
+fn a_plan_counts_what_is_left_and_touches_nothing() {
+    let desk = Desk::new();
+    desk.put("tiny.toml", include_str!("tiny.toml"));
+    let plan = args!["plan", "tiny.toml", "--out", "run", "--limit", "1"];
+    let before = desk.contents();
+    let text = desk.ok(plan.clone());
+    assert!(
+        text.contains("tiny: 2 sequences, 2 variants, 2 frames, protocol avatar-v1@1, on Blender"),
+        "{text}"
+    );
+    assert!(text.ends_with("1 avatars\n2 frames, 2 of them still to do\n"), "{text}");
+    assert!(desk.contents() == before);
+
+    desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1"]);
+    assert!(desk.ok(plan.clone()).ends_with("2 frames, 0 of them still to do\n"));
+    let mut shard = plan.clone();
+    shard.extend(args!["--shard", "1/2"]);
+    assert!(desk.ok(shard).ends_with("1 frames, 0 of them still to do\n"));
+
+    let mut as_json = plan;
+    as_json.extend(args!["--format", "json"]);
+    let json: Value = serde_json::from_str(&desk.ok(as_json)).unwrap();
+    assert_eq!((json["jobs"].as_array().unwrap().len(), json["avatars"].as_array().unwrap().len()), (2, 1));
+    assert!(text.starts_with(&format!("plan {}\n", json["digest"].as_str().unwrap())), "{text}");
+}

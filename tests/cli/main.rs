@@ -1,0 +1,21 @@
+//! The program from outside: every subcommand, every exit code, every kind of bad input.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+#[path = "../support/program.rs"]
+mod program;
+#[path = "../support/mod.rs"]
+mod support;
+
+mod bad_avatars;
+mod bad_bodies;
+mod bad_images;
+mod bad_outputs;
+mod bad_plans;
+mod blending;
+mod catalogues;
+mod made_up;
+mod posing;
+mod rendering;
+mod reports;
+mod scoring;
+mod usage;

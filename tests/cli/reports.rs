@@ -1,0 +1,109 @@
+//! `report`: formats, and the comparison with a baseline.
+
+use crate::args;
+use crate::program::Desk;
+use crate::support::data;
+use serde_json::Value;
+
+fn finished() -> Desk {
+    let desk = Desk::new();
+    desk.put("tiny.toml", include_str!("tiny.toml"));
+    let page = desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1"]);
+    assert_eq!(page, desk.read("run/tables.md"));
+    desk
+}
+
+#[test]
+fn a_report_repeats_the_files_of_the_run() {
+    let desk = finished();
+    for (format, file) in [("markdown", "run/tables.md"), ("csv", "run/tiny.csv"), ("latex", "run/tiny.tex")]
+    {
+        assert_eq!(desk.ok(args!["report", "run", "--format", format]), desk.read(file), "{format}");
+    }
+    assert_eq!(desk.ok(args!["report", "run/results.json"]), desk.read("run/tables.md"));
+    assert_eq!(desk.ok(args!["report", "run", "--table", "tiny"]), desk.read("run/tables.md"));
+    let tables: Value = serde_json::from_str(&desk.ok(args!["report", "run", "--format", "json"])).unwrap();
+    let results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
+    assert_eq!(tables, Value::Array(vec![results["tables"][0]["table"].clone()]));
+    assert!(
+        desk.read("run/tables.md").contains("Partial: at most 1 frame per sequence."),
+        "a subset is marked"
+    );
+}
+
+#[test]
+fn a_worse_result_is_exit_code_1() {
+    let desk = finished();
+    let compare = |candidate: &str, more: &[&str]| {
+        let mut arguments = args!["report", candidate, "--baseline", "run"];
+        arguments.extend(more.iter().map(std::ffi::OsString::from));
+        desk.run(arguments)
+    };
+    let same = compare("run", &[]).exits(0, "itself");
+    assert!(same.out.contains("verdict: identical"), "{}", same.out);
+
+    let mut results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
+    let summary = &mut results["tables"][0]["sequences"][0]["variants"][1]["summary"]["psnr"];
+    let psnr = summary.as_f64().unwrap();
+    *summary = Value::from(psnr - 0.25);
+    desk.put("worse.json", results.to_string());
+    let worse = compare("worse.json", &[]).exits(1, "0.25 dB less");
+    assert!(worse.out.contains("verdict: worse") && worse.out.contains("psnr"), "{}", worse.out);
+    compare("worse.json", &["--tolerance-psnr", "0.3"]).exits(0, "within the tolerance");
+    let json: Value = serde_json::from_str(&compare("worse.json", &["--format", "json"]).out).unwrap();
+    assert_eq!(json["verdict"], "worse");
+
+    results["tables"][0]["sequences"][0]["variants"][1]["summary"]["psnr"] = Value::from(psnr + 0.25);
+    desk.put("better.json", results.to_string());
+    compare("better.json", &[]).exits(0, "0.25 dB more");
+
+    results["tables"][0]["experiment"] = Value::from("other");
+    desk.put("other.json", results.to_string());
+    compare("other.json", &[]).exits(1, "nothing in common");
+}
+
+#[test]
+fn an_incomplete_run_is_exit_code_3() {
+    let desk = Desk::new();
+    desk.put(
+        "tiny.toml",
+        include_str!("tiny.toml").replace("sequences = [\"snapshot_ava\"]", "sequences = [\"nobody\"]"),
+    );
+    let answer = desk.run(args!["run", "tiny.toml", "--out", "run"]).exits(3, "no such subject");
+    assert!(answer.err.contains("no frame"), "{}", answer.err);
+    assert!(desk.read("run/tables.md").contains("no subject \\`nobody\\`"));
+}
+
+#[test]
+fn what_is_no_result_is_named() {
+    let desk = finished();
+    let results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
+    let changed = |change: fn(&mut Value)| {
+        let mut results = results.clone();
+        change(&mut results);
+        results.to_string()
+    };
+    for (content, parts) in [
+        (String::new(), vec!["bad.json"]),
+        ("[]".to_owned(), vec!["bad.json"]),
+        (changed(|r| r["schema"] = Value::from(99)), vec!["bad.json", "schema", "99"]),
+        (changed(|r| r["tables"] = Value::from("none")), vec!["bad.json", "expected a sequence"]),
+        (changed(|r| r["extra"] = Value::from(1)), vec!["bad.json", "extra"]),
+        (
+            changed(|r| {
+                r["tables"][0]["sequences"][0]["variants"][0]["summary"]["psnr"] = Value::from("high")
+            }),
+            vec!["bad.json"],
+        ),
+        (desk.read("run/results.json")[..400].to_owned(), vec!["bad.json", "line"]),
+    ] {
+        desk.put("bad.json", &content);
+        let shown = content.chars().take(80).collect::<String>();
+        desk.run(args!["report", "bad.json"]).refuses(&parts, &shown);
+        desk.run(args!["report", "run", "--baseline", "bad.json"]).refuses(&parts, &shown);
+    }
+    desk.run(args!["report", "nowhere"]).refuses(&["nowhere"], "no such run");
+    desk.run(args!["report", "."]).refuses(&["results.json"], "no run");
+    desk.run(args!["report", "run", "--table", "table9"]).refuses(&["table9", "tiny"], "no such table");
+    desk.run(args!["report", data("blender")]).refuses(&["results.json"], "a folder of data");
+}

@@ -1,0 +1,146 @@
+//! Help, usage errors, completions, closed pipes.
+
+use crate::args;
+use crate::program::Desk;
+use std::process::{Command, Stdio};
+
+const SUBCOMMANDS: [&str; 10] =
+    ["run", "plan", "report", "list", "render", "skin", "score", "blend", "inspect", "completions"];
+
+#[test]
+fn top_level_help() {
+    insta::assert_snapshot!(Desk::new().ok(args!["-h"]), @r#"
+    How should a Gaussian rotate on a skinned body?
+
+    Usage: reproduce [OPTIONS] <COMMAND>
+
+    Commands:
+      run          Evaluate: make avatars, pose, render, score, and write the tables
+      plan         Show what a run would do, without doing it
+      report       Print the tables of a run again, or compare them with a baseline
+      list         List experiments, datasets, strategies, protocols or metrics
+      render       Render a 3DGS PLY, posed or as it stands
+      skin         Pose an avatar and write a plain static 3DGS PLY
+      score        Score renders against truth: two images, or two folders whose frames pair up by name
+      blend        Blend rotations with every solver: check a shader or an engine against the exact
+                   answer
+      inspect      Show what a file or folder holds, and what is wrong with it
+      completions  Print a completion script for a shell
+      help         Print this message or the help of the given subcommand(s)
+
+    Options:
+          --threads <N>  Threads to compute with; results do not depend on it [default:
+                         SLURM_CPUS_PER_TASK, else all cores]
+      -q, --quiet        No progress, no notes: errors only
+      -h, --help         Print help (see more with '--help')
+      -V, --version      Print version
+
+    Exit codes:
+      0  done
+      1  ran, and the verdict is bad (a regression against a baseline)
+      2  could not run: usage, input or disk; one line on stderr says which file and field
+      3  incomplete: some frames failed or are missing from the tables
+    "#);
+}
+
+#[test]
+fn every_subcommand_has_help_with_every_option_explained() {
+    let desk = Desk::new();
+    for subcommand in SUBCOMMANDS {
+        let help = desk.ok(args![subcommand, "--help"]);
+        assert!(help.contains(&format!("Usage: reproduce {subcommand}")), "{help}");
+        // An option without a text would be followed by another option or by nothing.
+        let short = desk.ok(args![subcommand, "-h"]);
+        for line in short.lines().filter(|line| line.trim_start().starts_with("--")) {
+            let explained = line.trim().split("  ").filter(|part| !part.trim().is_empty()).count() > 1;
+            assert!(explained || !short.contains(&format!("{line}\n      --")), "{subcommand}: {line}");
+        }
+        assert_eq!(desk.ok(args!["help", subcommand]), help);
+    }
+    assert!(desk.ok(args!["--help"]).contains("Exit codes:"));
+    assert_eq!(desk.ok(args!["--version"]), format!("reproduce {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn wrong_usage_is_one_line_and_exit_code_2() {
+    let desk = Desk::new();
+    for (arguments, parts) in [
+        (args!["paint"], vec!["paint"]),
+        (args!["run", "--colour"], vec!["--colour"]),
+        (args!["run", "--profile", "huge"], vec!["--profile", "huge", "quick, standard"]),
+        (args!["run", "--limit", "-1"], vec!["-1"]),
+        (args!["run", "--limit", "many"], vec!["--limit", "many"]),
+        (args!["run", "--frames", "5..2"], vec!["--frames", "START < END"]),
+        (args!["run", "--shard", "4/3"], vec!["--shard", "1 <= i <= n"]),
+        (args!["run", "--shard", "1/2", "--fresh"], vec!["--shard", "--fresh"]),
+        (args!["--threads", "0", "list", "metrics"], vec!["--threads", "1..=1024"]),
+        (args!["render", "a.ply"], vec!["--camera", "--out", "Usage: reproduce render"]),
+        (args!["skin", "a.ply", "--out", "b.ply", "--strategy", "guess"], vec!["--strategy", "guess"]),
+        (args!["list", "everything"], vec!["everything", "experiments"]),
+        (args!["report", "--format", "word"], vec!["word", "markdown"]),
+        (args!["completions", "perl"], vec!["perl", "bash"]),
+    ] {
+        let what = format!("{arguments:?}");
+        desk.run(arguments).refuses(&parts, &what);
+    }
+    assert_eq!(desk.contents(), []);
+    let bare = desk.run(args![]).exits(2, "no arguments");
+    assert!(bare.err.contains("Commands:"), "{}", bare.err);
+}
+
+#[test]
+fn completions_parse() {
+    let desk = Desk::new();
+    for (shell, check) in [("bash", "-n"), ("zsh", "-n"), ("fish", "--no-execute")] {
+        let script = desk.ok(args!["completions", shell]);
+        for subcommand in SUBCOMMANDS {
+            assert!(script.contains(subcommand), "{shell}: {subcommand}");
+        }
+        let path = desk.put(&format!("script.{shell}"), script);
+        match Command::new(shell).arg(check).arg(path).output() {
+            Ok(output) => {
+                let problem = String::from_utf8_lossy(&output.stderr).into_owned();
+                assert!(output.status.success() && problem.is_empty(), "{shell}: {problem}");
+            }
+            // Only bash can be counted on.
+            Err(error) => assert!(shell != "bash", "{shell}: {error}"),
+        }
+    }
+}
+
+/// What `reproduce ... | head -c 0` does: the reader goes away before the first byte.
+#[test]
+fn a_closed_pipe_is_no_error() {
+    let desk = Desk::new();
+    let many: Vec<_> = (0..20_000)
+        .map(|i| serde_json::json!({ "name": i.to_string(), "quats_wxyz": [[1, 0, 0, 0]], "weights": [1] }))
+        .collect();
+    desk.put("many.json", serde_json::to_string(&many).unwrap());
+    for arguments in
+        [args!["blend", "many.json"], args!["list", "metrics"], args!["--help"], args!["completions", "bash"]]
+    {
+        let what = format!("{arguments:?}");
+        let mut child =
+            desk.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && err.is_empty(), "{what}: {} {err}", output.status);
+    }
+    // Through a shell, as people type it.
+    let script =
+        format!("set -o pipefail; '{}' blend many.json | head -n 1", env!("CARGO_BIN_EXE_reproduce"));
+    let output = Command::new("bash").args(["-c", &script]).current_dir(desk.path("")).output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_output_is_an_error() {
+    let desk = Desk::new();
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = desk.command(args!["list", "metrics"]).stdout(full).output().unwrap();
+    let err = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!((output.status.code(), err.lines().count()), (Some(2), 1), "{err}");
+    assert!(err.contains("standard output"), "{err}");
+}
