@@ -3,11 +3,14 @@
 use super::{Error, Library};
 use crate::data::{Sequence, frames, npy, ply};
 use crate::experiment::{AvatarBuild, AvatarRecipe};
-use crate::fit::surface::{Placement, SurfaceInit, surface_init};
-use crate::fit::texture::{TexturedBody, gather_texture};
+use crate::fit::surface::{BindTo, Placement, SurfaceInit, surface_init};
+use crate::fit::texture::{TextureInit, TexturedBody, gather_texture};
 use crate::render::mesh::Texture;
+use crate::scene::RestBody;
 use crate::strategy::BoundAvatar;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// An avatar that is ready to be posed.
 #[derive(Debug)]
@@ -26,19 +29,10 @@ pub enum Prepared {
 pub fn prepare(build: &AvatarBuild, library: &Library, folder: &Path) -> Result<Prepared, Error> {
     let sequence = training(build, library)?;
     let file = kept(build, folder);
-    let fresh = !file.is_file();
     if let AvatarRecipe::TexturedMesh { size } = build.recipe {
-        if fresh {
-            npy_texture(&file, &gather_texture(&sequence, size)?)?;
-        }
-        let (image, _) = frames::load_image(&file)?;
-        let uv = sequence
-            .body
-            .uv
-            .clone()
-            .ok_or_else(|| Error::Absent { name: format!("{}: uv", build.subject) })?;
-        return Ok(Prepared::Textured(TexturedBody { uv, texture: Texture::new(image) }));
+        return Ok(Prepared::Textured(textured(&sequence, size, &file)?));
     }
+    let fresh = !file.is_file();
     if fresh {
         let avatar = surface_init(&sequence, &surface_options(build))?;
         ply::write_avatar(&file, &avatar, &ply::Metadata::default(), ply::Encoding::LittleEndian)?;
@@ -66,17 +60,32 @@ fn kept(build: &AvatarBuild, folder: &Path) -> PathBuf {
     folder.join(format!("{}.{extension}", build.key))
 }
 
-fn npy_texture(file: &Path, textured: &TexturedBody) -> Result<(), Error> {
-    let image = textured.texture.image();
-    let values = image.pixels().as_flattened().iter().copied();
-    Ok(npy::write_f32(file, &[image.height(), image.width(), 3], values)?)
+/// A textured body: its texture in `file`, its dressed vertices beside it.
+fn textured(sequence: &Sequence, size: u32, file: &Path) -> Result<TexturedBody, Error> {
+    let vertex_file = file.with_extension("vertices.npy");
+    if !(file.is_file() && vertex_file.is_file()) {
+        let made = gather_texture(sequence, &TextureInit { size, ..TextureInit::default() })?;
+        let vertices = made.body.vertices.iter().flat_map(|v| v.as_vec3().to_array());
+        npy::write_f32(&vertex_file, &[made.body.vertices.len(), 3], vertices)?;
+        frames::save_npy(file, made.texture.image())?;
+    }
+    let (image, _) = frames::load_image(file)?;
+    let vertices: Vec<DVec3> =
+        npy::read(&vertex_file)?.values.chunks_exact(3).map(DVec3::from_slice).collect();
+    let bare = &*sequence.body;
+    let body = RestBody { vertices, ..bare.clone() };
+    body.validate()?;
+    let no_uv = || Error::Absent { name: "texture coordinates of the body".to_owned() };
+    let uv = bare.uv.clone().ok_or_else(no_uv)?;
+    Ok(TexturedBody { body: Arc::new(body), uv, texture: Texture::new(image) })
 }
 
 fn surface_options(build: &AvatarBuild) -> SurfaceInit {
-    let placement = match build.recipe {
-        AvatarRecipe::SurfaceFace { .. } => Placement::Faces,
-        _ => Placement::Vertices,
+    let (placement, bind_to) = match build.recipe {
+        AvatarRecipe::SurfaceFace { .. } => (Placement::Faces, BindTo::Faces),
+        _ => (Placement::Vertices, BindTo::Joints),
     };
     let default = SurfaceInit::default();
-    SurfaceInit { placement, sh_degree: build.sh_degree.map_or(default.sh_degree, usize::from), ..default }
+    let sh_degree = build.sh_degree.map_or(default.sh_degree, usize::from);
+    SurfaceInit { placement, bind_to, sh_degree, ..default }
 }

@@ -8,7 +8,7 @@ use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
 use crate::metrics::{self, FrameScore, Protocol};
 use crate::render::mesh::SamplePattern;
 use crate::render::splat::{RenderSettings, Renderer};
-use crate::scene::{Camera, Image, PosedBody};
+use crate::scene::{Camera, Image, Pose, PosedBody};
 use crate::strategy::{self, Strategy};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -94,6 +94,7 @@ fn by_frame(jobs: &[Job]) -> Vec<Vec<&Job>> {
 struct Frame<'a> {
     truth: Truth,
     camera: &'a Camera,
+    pose: &'a Pose,
     body: PosedBody<'a>,
 }
 
@@ -101,8 +102,8 @@ impl<'a> Frame<'a> {
     fn load(sequence: &'a Sequence, index: usize) -> Result<Self, Error> {
         let truth = sequence.truth(index)?;
         let frame = &sequence.frames[index];
-        let body = PosedBody::new(&sequence.body, &sequence.poses[frame.pose])?;
-        Ok(Self { truth, camera: &sequence.cameras[frame.camera], body })
+        let (pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
+        Ok(Self { truth, camera, pose, body: PosedBody::new(&sequence.body, pose)? })
     }
 }
 
@@ -165,7 +166,7 @@ fn run_variant(
         Prepared::Textured(textured) => {
             let start = Instant::now();
             let pattern = SamplePattern::new(MESH_SAMPLES);
-            let rendered = textured.draw(&frame.body, frame.camera, pattern, background)?;
+            let rendered = textured.draw(frame.pose, frame.camera, pattern, background)?;
             seconds.render = start.elapsed().as_secs_f64();
             (rendered.image, None, None)
         }
