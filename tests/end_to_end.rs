@@ -169,10 +169,10 @@ fn other_settings_redo_only_what_they_change() {
     for preset in skinsplat::strategy::PRESETS.iter().filter(|preset| !shown.contains(&preset.id)) {
         assert!(page.contains(preset.title), "{} in {page}", preset.title);
     }
-    desk.put("tiny.toml", TABLE.replace("avatar-v1", "3dgs"));
+    desk.put("tiny.toml", TABLE.replace("avatar-v1", "hugs-full"));
     run(&desk, "run", &["--limit", "1"]);
     assert_eq!(rendered(&desk, "run"), 2);
-    assert!(desk.read("run/tables.md").contains("Protocol: 3dgs, version 1."));
+    assert!(desk.read("run/tables.md").contains("Protocol: hugs-full, version 1."));
 }
 
 fn copy(from: &Path, to: &Path) {

@@ -76,7 +76,7 @@ fn images_that_do_not_go_together() {
 fn arrays_that_are_no_images() {
     let desk = Desk::new();
     let write = |shape: &[usize], values: Vec<f32>| {
-        skinsplat::data::npy::write_f32(&desk.path("bad.npy"), shape, values.into_iter()).unwrap();
+        skinsplat::data::npy::write_f32(&desk.path("bad.npy"), shape, values).unwrap();
     };
     let inspect = |parts: &[&str], what: &str| desk.run(args!["inspect", "bad.npy"]).refuses(parts, what);
     write(&[4, 4, 3], vec![0.5; 48]);
