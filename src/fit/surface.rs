@@ -4,6 +4,7 @@
 use super::disc::{self, Disc};
 use super::fill::{Neighbours, fill_unknown};
 use super::gather::{Colours, Gathering, Parts, ROBUST_SCALE, consensus, gather};
+use super::room::room_below;
 use super::sighting::{Frame, SurfacePoint};
 use super::tessellation::Tessellation;
 use super::{Error, clothing, tessellation, training};
@@ -52,7 +53,7 @@ pub struct SurfaceInit {
     /// Opacity of every Gaussian, in (0, 1).
     pub opacity: f64,
     /// How far below the surface the Gaussians sit, in pixels of the training frames: a splat renderer widens every
-    /// outline by its low-pass filter. Gaussians that no frame shows (inside the mouth) stay where they are.
+    /// outline by its low-pass filter. Thin parts sink less; what no frame shows (inside the mouth) stays.
     pub inset: f64,
     /// SH degree of the colours, 0 to 3.
     pub sh_degree: usize,
@@ -76,7 +77,7 @@ impl Default for SurfaceInit {
             scale: 1.0,
             thickness: 0.1,
             opacity: 0.99,
-            inset: 1.3,
+            inset: 1.2,
             sh_degree: 0,
             smoothness: 0.1,
             most_frames: 64,
@@ -240,18 +241,24 @@ impl Layout {
         Ok(Self { discs, sites, parts, neighbours, pixel: pixel_on_surface(sequence)? })
     }
 
+    /// How far each Gaussian sits below its disc, metres.
+    fn insets(&self, init: &SurfaceInit, colours: &Colours) -> Vec<f64> {
+        let wanted = init.inset * self.pixel;
+        let room = room_below(&self.discs, wanted.abs() / SHARE_OF_ROOM);
+        let inset = |(room, &seen): (f64, &f32)| {
+            if seen > 0.0 { wanted.signum() * wanted.abs().min(SHARE_OF_ROOM * room) } else { 0.0 }
+        };
+        room.into_iter().zip(&colours.confidence).map(inset).collect()
+    }
+
     /// The avatar, bound to a body whose surface may lie below the one on which the Gaussians sit.
     fn avatar(&self, init: &SurfaceInit, colours: &Colours, body: &RestBody) -> Avatar {
         let shapes: Vec<_> = self.discs.iter().map(|d| d.gaussian(init.scale, init.thickness)).collect();
         let means: Vec<DVec3> = self
             .discs
             .iter()
-            .zip(&colours.confidence)
-            .map(
-                |(d, &seen)| {
-                    if seen > 0.0 { d.centre - d.normal * init.inset * self.pixel } else { d.centre }
-                },
-            )
+            .zip(self.insets(init, colours))
+            .map(|(d, inset)| d.centre - d.normal * inset)
             .collect();
         let logit = (init.opacity / (1.0 - init.opacity)).ln() as f32;
         let binding = match (init.bind_to, self.parts.skin.clone()) {
@@ -273,6 +280,10 @@ impl Layout {
         Avatar { gaussians, binding }
     }
 }
+
+/// Gaussians sink by at most this share of the room below them: they must not come out on the other side of a lip or an
+/// ear.
+const SHARE_OF_ROOM: f64 = 0.4;
 
 /// How far points lie above their sites on a body, along the interpolated unit vertex normal, metres.
 fn heights(body: &RestBody, sites: &[SurfacePoint], points: &[DVec3]) -> Vec<f32> {
