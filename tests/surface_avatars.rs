@@ -117,6 +117,7 @@ fn sequence(body: &RestBody, truth: RestBody, cameras: Vec<Camera>, shade: Shade
         poses: vec![Pose::rest(&body.skeleton)],
         frames: (0..cameras.len()).map(frame).collect(),
         cameras,
+        stored_sizes: None,
     }
 }
 

@@ -1,7 +1,7 @@
 //! What can go wrong between a file and a scene type.
 
 use crate::scene::SceneError;
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// An error of the data layer. Every variant names the file, the field in it and what was expected, in one line.
@@ -97,9 +97,23 @@ impl Error {
     }
 }
 
-/// Reads a whole file.
+/// What a pipe or device may deliver: such a source has no length of its own, and some never end.
+const MAX_STREAM: u64 = 1 << 32;
+
+/// Reads a whole file, or a pipe to its end.
 pub(super) fn read_bytes(path: &Path, field: &str, expected: &str) -> Result<Vec<u8>, Error> {
-    std::fs::read(path).map_err(|cause| Error::read(path, field, expected, cause))
+    let read = || {
+        let file = std::fs::File::open(path)?;
+        let length = file.metadata()?.len();
+        let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
+        if file.metadata()?.is_file() {
+            (&file).read_to_end(&mut bytes)?;
+        } else if (&file).take(MAX_STREAM).read_to_end(&mut bytes)? as u64 == MAX_STREAM {
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, "no end within 4 GiB"));
+        }
+        Ok(bytes)
+    };
+    read().map_err(|cause| Error::read(path, field, expected, cause))
 }
 
 /// Reads a whole UTF-8 file.

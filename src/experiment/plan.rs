@@ -82,6 +82,8 @@ pub struct AvatarBuild {
     pub sh_degree: Option<u8>,
     /// Longer side to which training frames are reduced, pixels; native if absent.
     pub resolution: Option<u32>,
+    /// Edge length that the avatar resolves, millimetres.
+    pub edge_mm: u32,
 }
 
 /// One test frame of one table: the truth is loaded once and every variant is rendered and scored against it, so that
@@ -224,6 +226,7 @@ impl Builder<'_> {
             recipe: variant.avatar.clone(),
             sh_degree: variant.sh_degree,
             resolution: None,
+            edge_mm: self.options.profile.avatar_edge_mm,
         };
         let content = if let AvatarRecipe::File { name } = &variant.avatar {
             let file = subject.avatars.iter().find(|avatar| &avatar.name == name);
@@ -241,7 +244,7 @@ impl Builder<'_> {
             let digest = &find_sequence(subject, &sequence).digest;
             let content = json!({
                 "code": CodeVersions::CURRENT.fit, "train": digest, "frames": frames,
-                "recipe": variant.avatar, "sh_degree": variant.sh_degree, "resolution": resolution,
+                "recipe": variant.avatar, "sh_degree": variant.sh_degree, "resolution": resolution, "edge_mm": build.edge_mm,
             });
             build = AvatarBuild { sequence: Some(sequence), frames, resolution, ..build };
             content

@@ -14,6 +14,8 @@ pub struct Profile {
     pub max_test_frames: Option<usize>,
     /// Longer side of the scored images, pixels: larger frames are reduced to it; native if absent.
     pub resolution: Option<u32>,
+    /// Edge length that avatars made from frames resolve, millimetres: about a pixel of the scored images.
+    pub avatar_edge_mm: u32,
 }
 
 impl Profile {
@@ -27,12 +29,19 @@ impl Profile {
             max_train_frames: Some(12),
             max_test_frames: Some(6),
             resolution: Some(256),
+            avatar_edge_mm: 14,
         }
     }
 
     /// Every frame at its native resolution.
     pub fn standard() -> Self {
-        Self { id: "standard".into(), max_train_frames: None, max_test_frames: None, resolution: None }
+        Self {
+            id: "standard".into(),
+            max_train_frames: None,
+            max_test_frames: None,
+            resolution: None,
+            avatar_edge_mm: 10,
+        }
     }
 
     /// The preset of this id.

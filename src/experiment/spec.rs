@@ -151,12 +151,8 @@ pub struct Variant {
 pub enum AvatarRecipe {
     /// One Gaussian per vertex of the body, bound to the vertex's joints, coloured from the training frames.
     SurfaceVertex {},
-    /// Gaussians on the faces of the body, bound by barycentric coordinates, coloured from the training frames.
-    SurfaceFace {
-        /// Gaussians per face; one sits at the centroid.
-        #[serde(default = "one")]
-        per_face: u32,
-    },
+    /// One Gaussian per face of the body, bound to it by barycentric coordinates, coloured from the training frames.
+    SurfaceFace {},
     /// The body's mesh with a texture gathered from the training frames, drawn by the triangle rasterizer.
     TexturedMesh {
         /// Side of the texture, texels.
@@ -167,11 +163,6 @@ pub enum AvatarRecipe {
         /// Name under which it is registered.
         name: String,
     },
-}
-
-/// The default of [`AvatarRecipe::SurfaceFace::per_face`].
-fn one() -> u32 {
-    1
 }
 
 impl AvatarRecipe {

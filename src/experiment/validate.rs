@@ -113,9 +113,6 @@ fn variant_is_possible(variant: &Variant, key: &str, file: &str) -> Result<(), E
         _ => {}
     }
     match variant.avatar {
-        AvatarRecipe::SurfaceFace { per_face } if !(1..=64).contains(&per_face) => {
-            fail("avatar.per_face", format!("{per_face}"), "1 to 64")
-        }
         AvatarRecipe::TexturedMesh { size } if !(16..=8192).contains(&size) => {
             fail("avatar.size", format!("{size}"), "16 to 8192 texels")
         }

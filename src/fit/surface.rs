@@ -82,7 +82,7 @@ impl Default for SurfaceInit {
             smoothness: 0.1,
             most_frames: 64,
             outline_rounds: 2,
-            refinements: 2,
+            refinements: 1,
         }
     }
 }

@@ -82,10 +82,11 @@ fn textured(sequence: &Sequence, size: u32, file: &Path) -> Result<TexturedBody,
 
 fn surface_options(build: &AvatarBuild) -> SurfaceInit {
     let (placement, bind_to) = match build.recipe {
-        AvatarRecipe::SurfaceFace { .. } => (Placement::Faces, BindTo::Faces),
+        AvatarRecipe::SurfaceFace {} => (Placement::Faces, BindTo::Faces),
         _ => (Placement::Vertices, BindTo::Joints),
     };
     let default = SurfaceInit::default();
     let sh_degree = build.sh_degree.map_or(default.sh_degree, usize::from);
-    SurfaceInit { placement, bind_to, sh_degree, ..default }
+    let longest_edge = f64::from(build.edge_mm) / 1000.0;
+    SurfaceInit { placement, bind_to, sh_degree, longest_edge, ..default }
 }

@@ -241,8 +241,8 @@ fn wrong_files_are_refused_by_name_and_key() {
         ),
         (
             "recipe = \"surface-vertex\"",
-            "recipe = \"surface-face\", per_face = 0",
-            "per_face: 0; expected 1 to 64",
+            "recipe = \"surface-face\", per_face = 2",
+            "unknown field `per_face`",
         ),
         (
             "baseline = \"matrices\"",

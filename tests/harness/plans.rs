@@ -108,7 +108,7 @@ fn keys_follow_what_numbers_depend_on() {
         ("protocol choice", &|e| e.protocol = "avatar-v1+ssim=uniform7".into()),
         ("strategy", &|e| e.variants[0].strategy = Some("face-tbn".into())),
         ("SH degree", &|e| e.variants[0].sh_degree = Some(2)),
-        ("recipe", &|e| e.variants[0].avatar = AvatarRecipe::SurfaceFace { per_face: 2 }),
+        ("recipe", &|e| e.variants[0].avatar = AvatarRecipe::SurfaceFace {}),
         ("antialiasing", &|e| e.antialiased = true),
     ];
     let mut seen = BTreeSet::from([first(&base)]);
