@@ -3,7 +3,6 @@
 
 #[path = "support/splat_scene.rs"]
 mod splat_scene;
-#[allow(unreachable_pub, reason = "shared by several test binaries")]
 mod support;
 
 use glam::{DMat4, Quat, Vec3};
