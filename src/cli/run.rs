@@ -6,6 +6,7 @@ use super::{Context, Exit, progress::Watch};
 use crate::data::atomic;
 use crate::experiment::{Records, Shard};
 use crate::report;
+use crate::run::gallery;
 use crate::run::provenance::Provenance;
 use crate::run::store::{self, FILE_NAME, Store};
 use crate::run::{self, Error};
@@ -34,6 +35,9 @@ pub(super) struct Run {
     /// Only this slice of the frames, counted from 1
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
+    /// Also write images/: where the variants differ most, truth and variants side by side with their errors
+    #[arg(long, conflicts_with = "shard")]
+    images: bool,
     /// Forget what the folder's results store knows
     #[arg(long, conflicts_with = "shard")]
     fresh: bool,
@@ -73,7 +77,7 @@ impl Run {
         let left = store::outstanding(plan.shard(self.shard), &known);
         let mut store = Store::open(&self.out.join(name), &plan.digest)?;
         let watch = Watch::new(context.quiet);
-        run::execute(plan, &left, library, &self.out.join("avatars"), &mut store, &|event| watch.see(event))?;
+        run::execute(plan, &left, library, &self.out.join(AVATARS), &mut store, &|event| watch.see(event))?;
         Ok(left.len())
     }
 
@@ -83,6 +87,9 @@ impl Run {
         let results = report::results(&planned.plan, &planned.experiments, &records)?;
         write_results(&self.out, &results)?;
         write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
+        if self.images {
+            self.write_images(planned, &records, context)?;
+        }
         emit(&report::page(&results))?;
         let out = self.out.display();
         context.note(format!("{out}: tables.md, results.json and more, in {:.1} s", provenance.seconds));
@@ -98,6 +105,24 @@ impl Run {
         Ok(Exit::Success)
     }
 }
+
+impl Run {
+    fn write_images(
+        &self,
+        Planned { plan, library, .. }: &Planned,
+        records: &Records,
+        context: Context,
+    ) -> Result<()> {
+        let watch = Watch::new(context.quiet);
+        let folder = self.out.join("images");
+        let avatars = self.out.join(AVATARS);
+        let page = gallery::write(plan, library, records, &avatars, &folder, &|event| watch.see(event))?;
+        write_text(&folder.join("README.md"), &page)
+    }
+}
+
+/// Folder, inside the run's, of the avatars that it made.
+const AVATARS: &str = "avatars";
 
 /// The results stores of a run's folder, sorted.
 pub(super) fn stores(folder: &Path) -> Result<Vec<PathBuf>> {

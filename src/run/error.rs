@@ -40,6 +40,12 @@ pub enum Error {
         /// Its name.
         name: String,
     },
+    /// An avatar that could not be made, when a frame needed it.
+    #[error("avatar: {problem}")]
+    Avatar {
+        /// What went wrong.
+        problem: String,
+    },
     /// A protocol with a captured background, for data that has none.
     #[error(
         "protocol {protocol}: background `captured`; expected a colour, since the data has no captured background"

@@ -1,15 +1,13 @@
 //! Executing jobs: one frame at a time, its truth loaded once, every variant posed, rendered and scored against it.
 
 use super::avatars::{Prepared, prepare};
+use super::frame::Frame;
 use super::store::Store;
 use super::{Error, Library};
-use crate::data::{Sequence, Truth};
+use crate::data::Sequence;
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
-use crate::metrics::{self, FrameScore, Protocol};
-use crate::render::mesh::SamplePattern;
-use crate::render::splat::{RenderSettings, Renderer};
-use crate::scene::{Camera, Image, Pose, PosedBody};
-use crate::strategy::{self, Strategy};
+use crate::metrics::{self, Protocol};
+use crate::render::splat::Renderer;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,15 +27,12 @@ pub enum Event {
     FrameDone,
 }
 
-/// Samples per pixel side with which textured meshes are drawn: 16 samples on a rotated grid.
-const MESH_SAMPLES: usize = 4;
-
 /// Does the jobs (what [`super::store::outstanding`] left of a plan's), and appends every record to the store as it comes.
 ///
 /// A frame that fails leaves a record that says why, and the others go on.
 ///
 /// # Errors
-/// An avatar that cannot be made, or a store or folder that cannot be written.
+/// A store or folder that cannot be written.
 pub fn execute(
     plan: &Plan,
     jobs: &[Job],
@@ -58,10 +53,14 @@ pub fn execute(
     })
 }
 
-type Avatars = BTreeMap<String, Prepared>;
+/// An avatar, or why there is none.
+pub(super) type Built = Result<Prepared, String>;
 
-/// The avatars that the jobs need, one after another: each build is parallel in itself.
-fn prepare_avatars(
+pub(super) type Avatars = BTreeMap<String, Built>;
+
+/// The avatars that the jobs need, one after another: each build is parallel in itself. One that cannot be made fails the
+/// frames that need it, and no others.
+pub(super) fn prepare_avatars(
     plan: &Plan,
     jobs: &[Job],
     library: &Library,
@@ -74,7 +73,7 @@ fn prepare_avatars(
     std::fs::create_dir_all(folder).map_err(|source| Error::Folder { path: folder.to_owned(), source })?;
     let mut avatars = Avatars::new();
     for build in builds {
-        avatars.insert(build.key.clone(), prepare(build, library, folder)?);
+        avatars.insert(build.key.clone(), prepare(build, library, folder).map_err(|error| error.to_string()));
         watch(Event::AvatarReady);
     }
     Ok(avatars)
@@ -88,23 +87,6 @@ fn by_frame(jobs: &[Job]) -> Vec<Vec<&Job>> {
         groups.entry(frame).or_default().push(job);
     }
     groups.into_values().collect()
-}
-
-/// A frame, loaded.
-struct Frame<'a> {
-    truth: Truth,
-    camera: &'a Camera,
-    pose: &'a Pose,
-    body: PosedBody<'a>,
-}
-
-impl<'a> Frame<'a> {
-    fn load(sequence: &'a Sequence, index: usize) -> Result<Self, Error> {
-        let truth = sequence.truth(index)?;
-        let frame = &sequence.frames[index];
-        let (pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
-        Ok(Self { truth, camera, pose, body: PosedBody::new(&sequence.body, pose)? })
-    }
 }
 
 /// The records of all jobs of one frame.
@@ -123,12 +105,11 @@ fn run_frame(
         jobs.iter().flat_map(record).collect()
     };
     let first = jobs[0];
-    let sequence = match library.sequence(&first.dataset, &first.subject, &first.sequence) {
+    let sequence = match test_sequence(first, library) {
         Ok(sequence) => sequence,
         Err(error) => return failed(&error),
     };
-    let reduced = first.resolution.map(|side| sequence.reduced(side));
-    let frame = match Frame::load(reduced.as_ref().unwrap_or(sequence), first.frame) {
+    let frame = match Frame::load(&sequence, first.frame) {
         Ok(frame) => frame,
         Err(error) => return failed(&error),
     };
@@ -147,6 +128,12 @@ fn run_frame(
     records
 }
 
+/// The sequence of a job at the job's resolution.
+pub(super) fn test_sequence(job: &Job, library: &Library) -> Result<Sequence, Error> {
+    let sequence = library.sequence(&job.dataset, &job.subject, &job.sequence)?;
+    Ok(job.resolution.map_or_else(|| sequence.clone(), |side| sequence.reduced(side)))
+}
+
 fn record(job: &Job, variant: &JobVariant, outcome: Outcome, seconds: Seconds) -> FrameRecord {
     FrameRecord { key: variant.key.clone(), label: job.label(variant), outcome, seconds }
 }
@@ -155,40 +142,16 @@ fn run_variant(
     job: &Job,
     variant: &JobVariant,
     frame: &Frame<'_>,
-    avatar: &Prepared,
+    avatar: &Built,
     renderer: &mut Renderer,
     seconds: &mut Seconds,
 ) -> Result<Outcome, Error> {
+    let avatar = avatar.as_ref().map_err(|problem| Error::Avatar { problem: problem.clone() })?;
     let protocol = Protocol::parse(&job.protocol)?;
-    let background =
-        protocol.background_colour().ok_or_else(|| Error::NoBackground { protocol: job.protocol.clone() })?;
-    let (image, splats, visible_splats) = match avatar {
-        Prepared::Textured(textured) => {
-            let start = Instant::now();
-            let pattern = SamplePattern::new(MESH_SAMPLES);
-            let rendered = textured.draw(frame.pose, frame.camera, pattern, background)?;
-            seconds.render = start.elapsed().as_secs_f64();
-            (rendered.image, None, None)
-        }
-        Prepared::Gaussians(bound) => {
-            let strategy: Strategy = variant.strategy.as_deref().unwrap_or_default().parse()?;
-            let start = Instant::now();
-            let posed = strategy::pose(bound, &frame.body, &strategy)?;
-            seconds.pose = start.elapsed().as_secs_f64();
-            let settings = RenderSettings { background, antialiased: job.antialiased };
-            let start = Instant::now();
-            let rendered = renderer.render(&posed, frame.camera, &settings);
-            seconds.render = start.elapsed().as_secs_f64();
-            (rendered.image, Some(posed.len() as u64), Some(renderer.visible() as u64))
-        }
-    };
+    let drawn = frame.draw(job, variant, avatar, renderer, seconds)?;
     let start = Instant::now();
-    let score = score(&protocol, &image, &frame.truth)?;
+    let truth = metrics::Truth::Straight { rgb: &frame.truth.rgb, alpha: &frame.truth.alpha };
+    let score = protocol.score(&drawn.image, truth)?;
     seconds.score = start.elapsed().as_secs_f64();
-    Ok(Outcome::Scored { score, splats, visible_splats })
-}
-
-fn score(protocol: &Protocol, image: &Image, truth: &Truth) -> Result<FrameScore, Error> {
-    let truth = metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha };
-    Ok(protocol.score(image, truth)?)
+    Ok(Outcome::Scored { score, splats: drawn.splats, visible_splats: drawn.visible_splats })
 }

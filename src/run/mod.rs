@@ -1,11 +1,13 @@
 //! Executing a plan and keeping what comes out.
 //!
 //! [`Library`] holds the data at hand, [`avatars`] makes what is to be posed, [`execute()`] walks the frames, [`store`]
-//! remembers every record by its content key.
+//! remembers every record by its content key, [`gallery`] shows where the variants differ.
 
 pub mod avatars;
 mod error;
 mod execute;
+mod frame;
+pub mod gallery;
 mod library;
 pub mod provenance;
 pub mod store;

@@ -1,0 +1,79 @@
+//! One frame: its truth, its camera, the body in its pose, and what a variant draws of it.
+
+use super::Error;
+use super::avatars::Prepared;
+use crate::data::{Sequence, Truth};
+use crate::experiment::{Job, JobVariant, Seconds};
+use crate::metrics::Protocol;
+use crate::render::mesh::SamplePattern;
+use crate::render::splat::{RenderSettings, Renderer};
+use crate::scene::{Camera, Image, Pose, PosedBody};
+use crate::strategy::{self, Strategy};
+use std::time::Instant;
+
+/// Samples per pixel side with which textured meshes are drawn: 16 samples on a rotated grid.
+const MESH_SAMPLES: usize = 4;
+
+/// A frame, loaded.
+pub(super) struct Frame<'a> {
+    pub(super) truth: Truth,
+    camera: &'a Camera,
+    pose: &'a Pose,
+    body: PosedBody<'a>,
+}
+
+impl<'a> Frame<'a> {
+    pub(super) fn load(sequence: &'a Sequence, index: usize) -> Result<Self, Error> {
+        let truth = sequence.truth(index)?;
+        let frame = &sequence.frames[index];
+        let (pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
+        Ok(Self { truth, camera, pose, body: PosedBody::new(&sequence.body, pose)? })
+    }
+
+    /// Draws the frame as a variant poses it, over the background of the job's protocol.
+    pub(super) fn draw(
+        &self,
+        job: &Job,
+        variant: &JobVariant,
+        avatar: &Prepared,
+        renderer: &mut Renderer,
+        seconds: &mut Seconds,
+    ) -> Result<Drawn, Error> {
+        let background = background(job)?;
+        let bound = match avatar {
+            Prepared::Textured(textured) => {
+                let start = Instant::now();
+                let pattern = SamplePattern::new(MESH_SAMPLES);
+                let image = textured.draw(self.pose, self.camera, pattern, background)?.image;
+                seconds.render = start.elapsed().as_secs_f64();
+                return Ok(Drawn { image, splats: None, visible_splats: None });
+            }
+            Prepared::Gaussians(bound) => bound,
+        };
+        let strategy: Strategy = variant.strategy.as_deref().unwrap_or_default().parse()?;
+        let start = Instant::now();
+        let posed = strategy::pose(bound, &self.body, &strategy)?;
+        seconds.pose = start.elapsed().as_secs_f64();
+        let settings = RenderSettings { background, antialiased: job.antialiased };
+        let start = Instant::now();
+        let image = renderer.render(&posed, self.camera, &settings).image;
+        seconds.render = start.elapsed().as_secs_f64();
+        let (splats, visible) = (posed.len() as u64, renderer.visible() as u64);
+        Ok(Drawn { image, splats: Some(splats), visible_splats: Some(visible) })
+    }
+}
+
+/// What a variant looks like.
+pub(super) struct Drawn {
+    pub(super) image: Image,
+    /// Gaussians of the avatar; none for a textured mesh.
+    pub(super) splats: Option<u64>,
+    /// Those that reach the image.
+    pub(super) visible_splats: Option<u64>,
+}
+
+/// The background of a job's protocol.
+pub(super) fn background(job: &Job) -> Result<[f32; 3], Error> {
+    let none = || Error::NoBackground { protocol: job.protocol.clone() };
+    Protocol::parse(&job.protocol)?.background_colour().ok_or_else(none)
+}
