@@ -10,7 +10,8 @@ use std::path::PathBuf;
 
 /// Blend rotations with every solver: check a shader or an engine against the exact answer.
 ///
-/// CASES.json is a list of {"name", "quats_wxyz": [[w,x,y,z], ...], "weights": [...]} (other keys are ignored).
+/// CASES.json is a list of objects with "name", "quats_wxyz" (a list w, x, y, z per bone) and "weights"; other keys are
+/// ignored.
 /// Quaternions are normalised first. Weights need not sum to one: the blend, its raw conversion, the eigenvalues and
 /// their gap are those of the weights as given; no other answer depends on the sum. Each answer has its component of
 /// largest magnitude positive, except the raw conversion, which is as PyTorch3D returns it.

@@ -13,7 +13,7 @@
 //! `quaternion-average+rotation=power-15+colour=none` varies one. A fifth of anything is one enum arm, one row in the
 //! table of ids and one function: `rotate` for rotations, `covariance`, `colour`. The compiler lists the places.
 //!
-//! [`BoundAvatar`] holds what does not depend on the pose; [`pose`] is the hot path.
+//! [`BoundAvatar`] holds what does not depend on the pose; [`pose()`] is the hot path.
 //!
 //! [`Posed`]: crate::scene::Posed
 
