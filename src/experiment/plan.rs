@@ -169,13 +169,6 @@ impl Builder<'_> {
         let (source, rows) = rows_of(experiment, self.datasets, self.options);
         let invalid = |(problem, expected)| Error::invalid(&experiment.id, "protocol", problem, expected);
         let protocol = catalog::protocol(experiment.protocol_on(source)).map_err(invalid)?;
-        if protocol.background_colour().is_none() && !rows.is_empty() {
-            let expected = format!(
-                "a colour: the data has no captured background; try {}+background=[1, 1, 1]",
-                protocol.id
-            );
-            return Err(invalid(("background `captured`".to_owned(), expected)));
-        }
         let wanted = &self.options.subset.variants;
         let variants: Vec<(usize, &Variant)> = (experiment.variants.iter().enumerate())
             .filter(|(_, variant)| wanted.is_empty() || wanted.contains(&variant.id))

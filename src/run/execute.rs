@@ -1,7 +1,7 @@
 //! Executing jobs: one frame at a time, its truth loaded once, every variant posed, rendered and scored against it.
 
 use super::avatars::{Prepared, prepare};
-use super::frame::Frame;
+use super::frame::{Frame, background};
 use super::store::Store;
 use super::{Error, Library};
 use crate::data::Sequence;
@@ -32,7 +32,7 @@ pub enum Event {
 /// A frame that fails leaves a record that says why, and the others go on.
 ///
 /// # Errors
-/// A store or folder that cannot be written.
+/// A protocol that needs what the data does not have, or a store or folder that cannot be written.
 pub fn execute(
     plan: &Plan,
     jobs: &[Job],
@@ -41,6 +41,7 @@ pub fn execute(
     store: &mut Store,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<(), Error> {
+    jobs.iter().try_for_each(|job| background(job).map(drop))?;
     let avatars = prepare_avatars(plan, jobs, library, folder, watch)?;
     watch(Event::Frames(jobs.len()));
     let store = Mutex::new(store);

@@ -185,8 +185,9 @@ fn the_embedded_registry_names_what_is_there() {
     let registry = Registry::embedded();
     let available: Vec<&str> =
         registry.datasets.iter().filter(|d| d.is_available()).map(|d| d.id.as_str()).collect();
-    assert_eq!(available[..4], ["synthetic", "snapshot_ava", "multiview_ben", "xhands_ava"]);
-    for id in &available[1..4] {
+    let shipped = ["synthetic", "synthetic_arm", "snapshot_ava", "multiview_ben", "xhands_ava"];
+    assert_eq!(available[..5], shipped);
+    for id in &shipped[2..] {
         let dataset = registry.get(id).unwrap();
         let folder = &dataset.subject_folders().unwrap()[0];
         let subject = dataset.load_subject(folder, &Options::default()).unwrap();
