@@ -15,7 +15,12 @@ impl Dataset {
             return self.generate();
         }
         let folders = self.subject_folders().unwrap_or_default();
-        folders.iter().map(|folder| self.load_subject(folder, options)).collect()
+        let mut subjects =
+            folders.iter().map(|f| self.load_subject(f, options)).collect::<Result<Vec<_>, _>>()?;
+        for (subject, id) in subjects.iter_mut().zip(&self.subjects) {
+            subject.id.clone_from(id);
+        }
+        Ok(subjects)
     }
 
     /// The subjects of a synthetic dataset: those of its parameters, or those that come with the program.

@@ -40,9 +40,13 @@ pub struct Dataset {
     /// Whether its subjects may stand in for those of a dataset that is not here.
     #[serde(default = "yes")]
     pub stand_in: bool,
-    /// Folder names of the subjects; empty if `path` is the only subject.
+    /// Ids of the subjects, which are their folders' names unless `folders` says otherwise; empty if `path` is the only
+    /// subject.
     #[serde(default)]
     pub subjects: Vec<String>,
+    /// Folder names of subjects that experiments call otherwise.
+    #[serde(default)]
+    pub folders: BTreeMap<String, String>,
     /// Frames to train and test on, by subject, for layouts that do not say.
     #[serde(default)]
     pub splits: BTreeMap<String, Split>,
@@ -153,7 +157,8 @@ impl Registry {
                     "an id of its own",
                 ));
             }
-            let within = dataset.subjects.iter().all(|s| Path::new(s).components().count() == 1);
+            let names = dataset.subjects.iter().chain(dataset.folders.values());
+            let within = names.into_iter().all(|s| Path::new(s).components().count() == 1);
             if !within {
                 let expected = "names of folders inside path";
                 return Err(Error::invalid(path, format!("dataset[{i}].subjects"), "a path", expected));
@@ -178,7 +183,10 @@ impl Dataset {
         let path = self.path.as_ref()?;
         Some(match self.subjects.is_empty() {
             true => vec![path.clone()],
-            false => self.subjects.iter().map(|subject| path.join(subject)).collect(),
+            false => {
+                let folder = |subject| path.join(self.folders.get(subject).unwrap_or(subject));
+                self.subjects.iter().map(folder).collect()
+            }
         })
     }
 
@@ -229,6 +237,7 @@ fn found(folder: &Path) -> Result<Dataset, Error> {
         model: None,
         stand_in: true,
         subjects: Vec::new(),
+        folders: BTreeMap::new(),
         splits: BTreeMap::new(),
         parameters: toml::Table::new(),
     })
