@@ -3,6 +3,7 @@
 pub mod avatar;
 pub mod body;
 pub mod camera;
+pub mod gradient;
 pub mod image;
 pub mod pose;
 pub mod posed;
@@ -11,6 +12,7 @@ pub mod skin_weights;
 pub use avatar::{Avatar, Binding, FaceBinding, Gaussians};
 pub use body::{Body, JointTransform, PosedBody, PosedMesh, RestBody, ShapeSpace, Skeleton, Uv};
 pub use camera::Camera;
+pub use gradient::{AvatarGradient, PosedGradient, RenderedGradient};
 pub use image::{Image, Mask};
 pub use pose::{LocalTransform, Pose};
 pub use posed::{ColourClamp, Posed, Rendered};
