@@ -10,6 +10,7 @@ mod disc;
 mod error;
 mod fill;
 mod gather;
+mod loss;
 mod room;
 mod sighting;
 pub mod surface;
