@@ -9,32 +9,13 @@ use super::sighting::{Frame, SurfacePoint};
 use super::tessellation::Tessellation;
 use super::{Error, clothing, tessellation, training};
 use crate::data::sequence::Sequence;
+pub use crate::experiment::recipe::{BindTo, Placement};
 use crate::math::sh;
 use crate::render::splat::{RenderSettings, render};
 use crate::scene::body::vertex_normals;
 use crate::scene::{Avatar, Binding, FaceBinding, Gaussians, PosedBody, RestBody, SceneError, SkinWeights};
 use crate::strategy::{BoundAvatar, Strategy, pose};
 use glam::DVec3;
-
-/// Where the Gaussians sit on the (tessellated) mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Placement {
-    /// One per vertex.
-    Vertices,
-    /// One per face, at its centroid.
-    Faces,
-}
-
-/// How the Gaussians move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum BindTo {
-    /// By linear blend skinning, with the interpolated weights of the body's vertices.
-    Joints,
-    /// With the face of the body on which they sit.
-    Faces,
-}
 
 /// How a surface-initialised avatar is made. The defaults gave the best PSNR on held-out frames.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -96,10 +96,8 @@ impl Sources<'_> {
         if y < 0 || y >= image.height() as isize {
             return;
         }
-        let (start, end) = (
-            self.window.x.start.saturating_sub(RADIUS),
-            (self.window.x.end + RADIUS).min(image.width()),
-        );
+        let (start, end) =
+            (self.window.x.start.saturating_sub(RADIUS), (self.window.x.end + RADIUS).min(image.width()));
         let pixels = &image.pixels()[y as usize * image.width()..][start..end];
         let offset = CHANNELS * (start + RADIUS - self.window.x.start);
         out[offset..offset + CHANNELS * pixels.len()].copy_from_slice(pixels.as_flattened());
