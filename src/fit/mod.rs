@@ -5,6 +5,7 @@
 //! frame (`sighting`), and what explains best what was seen there (`gather`). Frames are loaded a few at a time, in
 //! order; within a frame every point is independent: the avatar has the same bits for any number of threads.
 
+mod adam;
 pub mod clothing;
 mod disc;
 mod error;
