@@ -4,7 +4,7 @@ use crate::data::folder::Options;
 use crate::data::registry::{Dataset, Registry};
 use crate::experiment::Experiment;
 use crate::run::{Library, LoadedDataset};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 
 /// Where data comes from.
@@ -34,17 +34,35 @@ impl Data {
         })
     }
 
+    /// Loads every data set that is there, or the one of this id.
+    pub(super) fn available(&self, id: Option<&str>) -> Result<Vec<LoadedDataset>> {
+        let registry = self.registry()?;
+        if let Some(id) = id
+            && !registry.datasets.iter().any(|dataset| dataset.id == id)
+        {
+            let known: Vec<&str> = registry.datasets.iter().map(|dataset| dataset.id.as_str()).collect();
+            bail!("data set `{id}`; expected one of {}", known.join(", "));
+        }
+        let wanted = |d: &&Dataset| match id {
+            Some(id) => d.id == id,
+            None => d.is_available(),
+        };
+        registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset)).collect()
+    }
+
+    fn load(&self, dataset: &Dataset) -> Result<LoadedDataset> {
+        let options = Options { model: None, clothing: self.clothing };
+        let subjects = dataset.load(&options)?;
+        Ok(LoadedDataset { id: dataset.id.clone(), title: dataset.title.clone(), subjects })
+    }
+
     /// Loads what the experiments can use: their own datasets, and those that may stand in.
     pub(super) fn library(&self, experiments: &[Experiment]) -> Result<Library> {
-        let options = Options { model: None, clothing: self.clothing };
         let own = |id: &str| experiments.iter().any(|experiment| experiment.dataset == id);
         let stands_in = experiments.iter().any(|experiment| experiment.stand_in.is_some());
         let wanted = |d: &&Dataset| d.is_available() && (own(&d.id) || (stands_in && d.stand_in));
-        let mut loaded = Vec::new();
-        for dataset in self.registry()?.datasets.iter().filter(wanted) {
-            let subjects = dataset.load(&options)?;
-            loaded.push(LoadedDataset { id: dataset.id.clone(), title: dataset.title.clone(), subjects });
-        }
-        Ok(Library::new(loaded))
+        let registry = self.registry()?;
+        let loaded = registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset));
+        Ok(Library::new(loaded.collect::<Result<_>>()?))
     }
 }

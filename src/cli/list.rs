@@ -4,11 +4,12 @@ use super::Exit;
 use super::data::Data;
 use super::output::emit;
 use super::planning::known_experiments;
+use crate::experiment::RECIPES;
 use crate::metrics::{MetricKind, PROTOCOLS, SsimVariant, VARIANT_IDS};
 use crate::strategy::PRESETS;
 use anyhow::Result;
 
-/// List experiments, datasets, strategies, protocols or metrics.
+/// List experiments, datasets, strategies, recipes, protocols or metrics.
 #[derive(Debug, clap::Args)]
 pub(super) struct List {
     /// What to list
@@ -27,6 +28,8 @@ enum What {
     Datasets,
     /// Rotation strategies.
     Strategies,
+    /// Fitting recipes.
+    Recipes,
     /// Scoring protocols.
     Protocols,
     /// Metrics and their variants.
@@ -39,6 +42,7 @@ impl List {
             What::Experiments => experiments()?,
             What::Datasets => self.datasets()?,
             What::Strategies => strategies(),
+            What::Recipes => recipes(),
             What::Protocols => protocols(),
             What::Metrics => metrics(),
         };
@@ -71,6 +75,10 @@ fn strategies() -> Vec<[String; 2]> {
         .iter()
         .map(|p| [p.id.to_owned(), format!("{}: {} [{}]", p.title, p.summary, p.strategy)])
         .collect()
+}
+
+fn recipes() -> Vec<[String; 2]> {
+    RECIPES.iter().map(|r| [r.id.clone(), format!("{} [{}]", r.title, r.strategy)]).collect()
 }
 
 fn protocols() -> Vec<[String; 2]> {

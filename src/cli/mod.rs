@@ -4,6 +4,7 @@ mod blend;
 mod completions;
 mod data;
 mod exit;
+mod fit;
 mod inspect;
 mod list;
 mod output;
@@ -48,6 +49,7 @@ enum Command {
     Plan(plan::Plan),
     Report(report::Report),
     List(list::List),
+    Fit(fit::Fit),
     Render(render::Render),
     Skin(skin::Skin),
     Score(score::Score),
@@ -120,6 +122,7 @@ impl Command {
             Self::Plan(command) => command.run(),
             Self::Report(command) => command.run(context),
             Self::List(command) => command.run(),
+            Self::Fit(command) => command.run(context),
             Self::Render(command) => command.run(context),
             Self::Skin(command) => command.run(context),
             Self::Score(command) => command.run(),

@@ -12,7 +12,7 @@ pub(super) struct Planning {
     /// Experiments: ids (see `reproduce list experiments`) or .toml files [default: the six tables]
     #[arg(value_name = "EXPERIMENT")]
     experiments: Vec<String>,
-    /// How much of the data to look at: quick (256 pixels, few frames) or standard (everything)
+    /// How much of the data to look at: quick (256 pixels, few frames, short fits), standard (everything), paper (long fits)
     #[arg(long, value_name = "P", default_value = "quick", value_parser = profile)]
     profile: Profile,
     /// Add a row for every strategy
@@ -86,7 +86,7 @@ pub(super) fn known_experiments() -> Result<Vec<Experiment>> {
     Ok(if folder.is_dir() { Experiment::load_folder(&folder)? } else { Experiment::embedded() })
 }
 
-fn profile(id: &str) -> Result<Profile, String> {
+pub(super) fn profile(id: &str) -> Result<Profile, String> {
     Profile::preset(id).ok_or_else(|| format!("expected one of {}", Profile::IDS.join(", ")))
 }
 

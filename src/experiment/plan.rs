@@ -2,13 +2,13 @@
 
 use super::rows::{DataRow, Source, rows_of};
 use super::{
-    AvatarRecipe, CodeVersions, Dataset, Error, Experiment, Options, SequenceInfo, Shard, SubjectInfo,
-    Variant, catalog, content_key,
+    AvatarRecipe, CodeVersions, Dataset, Error, Experiment, FitOptions, Options, Recipe, SequenceInfo, Shard,
+    SubjectInfo, Variant, catalog, content_key,
 };
 use crate::metrics::{Protocol, ProtocolId};
 use crate::strategy::Strategy;
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
 /// Everything that a run has to do and a report has to show, as plain data.
@@ -84,6 +84,17 @@ pub struct AvatarBuild {
     pub resolution: Option<u32>,
     /// Edge length that the avatar resolves, millimetres.
     pub edge_mm: u32,
+    /// How it is fitted; none if it is not.
+    pub fit: Option<PlannedFit>,
+}
+
+/// A fit to be made.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlannedFit {
+    /// Recipe and budget.
+    pub options: FitOptions,
+    /// Content key of the avatar with which it starts: recipes that start alike share it.
+    pub start: String,
 }
 
 /// One test frame of one table: the truth is loaded once and every variant is rendered and scored against it, so that
@@ -227,6 +238,7 @@ impl Builder<'_> {
             sh_degree: variant.sh_degree,
             resolution: None,
             edge_mm: self.options.profile.avatar_edge_mm,
+            fit: None,
         };
         let content = if let AvatarRecipe::File { name } = &variant.avatar {
             let file = subject.avatars.iter().find(|avatar| &avatar.name == name);
@@ -242,11 +254,21 @@ impl Builder<'_> {
                 (problem, "a subject with one, or a recipe that reads a file".to_owned())
             })?;
             let digest = &find_sequence(subject, &sequence).digest;
-            let content = json!({
-                "code": CodeVersions::CURRENT.fit, "train": digest, "frames": frames,
-                "recipe": variant.avatar, "sh_degree": variant.sh_degree, "resolution": resolution, "edge_mm": build.edge_mm,
+            let of_frames = json!({
+                "code": CodeVersions::CURRENT.fit, "train": digest, "frames": frames, "resolution": resolution,
+                "edge_mm": build.edge_mm,
             });
-            build = AvatarBuild { sequence: Some(sequence), frames, resolution, ..build };
+            let fit = self.fit(&variant.avatar, &of_frames)?;
+            let content = match &fit {
+                Some(PlannedFit { options, .. }) => json!({
+                    "made": of_frames, "code": CodeVersions::CURRENT, "recipe": options.recipe.choices(),
+                    "iterations": options.iterations, "seed": options.seed,
+                }),
+                None => {
+                    json!({ "made": of_frames, "recipe": variant.avatar, "sh_degree": variant.sh_degree })
+                }
+            };
+            build = AvatarBuild { sequence: Some(sequence), frames, resolution, fit, ..build };
             content
         };
         build.key = content_key(&json!({ "avatar": content }));
@@ -255,6 +277,18 @@ impl Builder<'_> {
             self.avatars.push(build);
         }
         Ok(key)
+    }
+
+    /// The fit of a recipe, if it is one, on training frames that `of_frames` describes in full.
+    fn fit(&self, avatar: &AvatarRecipe, of_frames: &Value) -> Result<Option<PlannedFit>, (String, String)> {
+        let AvatarRecipe::Fit { name, seed } = avatar else { return Ok(None) };
+        let recipe =
+            Recipe::parse(name).map_err(|error| (error.to_string(), "a fitting recipe".to_owned()))?;
+        let profile = &self.options.profile;
+        let iterations = profile.fit_iterations.map_or(recipe.iterations, |most| recipe.iterations.min(most));
+        let start = content_key(&json!({ "start": of_frames, "how": recipe.start }));
+        let options = FitOptions { recipe, iterations, seed: *seed, edge_mm: profile.avatar_edge_mm };
+        Ok(Some(PlannedFit { options, start }))
     }
 
     /// The jobs of a row, one per frame. `place` is the index of the table and of the row.

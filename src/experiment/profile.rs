@@ -14,34 +14,43 @@ pub struct Profile {
     pub max_test_frames: Option<usize>,
     /// Longer side of the scored images, pixels: larger frames are reduced to it; native if absent.
     pub resolution: Option<u32>,
+    /// Most iterations of a fit, one training frame each; as many as the recipe says if absent.
+    pub fit_iterations: Option<u32>,
     /// Edge length that avatars made from frames resolve, millimetres: about a pixel of the scored images.
     pub avatar_edge_mm: u32,
 }
 
 impl Profile {
     /// Ids of the presets.
-    pub const IDS: [&str; 2] = ["quick", "standard"];
+    pub const IDS: [&str; 3] = ["quick", "standard", "paper"];
 
-    /// A look in minutes: 12 training and 6 test frames per sequence, images of at most 256 pixels.
+    /// A look in minutes: 12 training and 6 test frames per sequence, images of at most 256 pixels, short fits.
     pub fn quick() -> Self {
         Self {
             id: "quick".into(),
             max_train_frames: Some(12),
             max_test_frames: Some(6),
             resolution: Some(256),
+            fit_iterations: Some(300),
             avatar_edge_mm: 14,
         }
     }
 
-    /// Every frame at its native resolution.
+    /// Every frame at its native resolution, fitted in minutes each.
     pub fn standard() -> Self {
         Self {
             id: "standard".into(),
             max_train_frames: None,
             max_test_frames: None,
             resolution: None,
+            fit_iterations: Some(2000),
             avatar_edge_mm: 10,
         }
+    }
+
+    /// Every frame at its native resolution, fitted for as many iterations as the compared method's own.
+    pub fn paper() -> Self {
+        Self { id: "paper".into(), fit_iterations: None, avatar_edge_mm: 7, ..Self::standard() }
     }
 
     /// The preset of this id.
@@ -49,6 +58,7 @@ impl Profile {
         match id {
             "quick" => Some(Self::quick()),
             "standard" => Some(Self::standard()),
+            "paper" => Some(Self::paper()),
             _ => None,
         }
     }

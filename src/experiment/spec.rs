@@ -158,6 +158,14 @@ pub enum AvatarRecipe {
         /// Side of the texture, texels.
         size: u32,
     },
+    /// Gaussians that are fitted to the training frames.
+    Fit {
+        /// The fitting recipe: an id of `recipes.toml`, or one with other choices.
+        name: String,
+        /// Seed of all that is random in it.
+        #[serde(default)]
+        seed: u64,
+    },
     /// A file that the data set registers for the subject.
     File {
         /// Name under which it is registered.

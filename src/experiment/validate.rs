@@ -1,6 +1,6 @@
 //! Checks of an experiment that its types cannot make.
 
-use super::{AvatarRecipe, Error, Experiment, Paper, Role, Split, Variant, catalog};
+use super::{AvatarRecipe, Error, Experiment, Paper, Recipe, Role, Split, Variant, catalog};
 use std::collections::BTreeSet;
 
 /// Checks one experiment.
@@ -102,6 +102,19 @@ fn variant_is_possible(variant: &Variant, key: &str, file: &str) -> Result<(), E
             }
         }
         (None, false) => {}
+    }
+    if let AvatarRecipe::Fit { name, .. } = &variant.avatar {
+        if let Err(error) = Recipe::parse(name) {
+            return fail("avatar.name", error.to_string(), "a fitting recipe");
+        }
+        if variant.sh_degree.is_some() {
+            return fail(
+                "sh_degree",
+                "given".into(),
+                "none: the fitting recipe has it (+sh_degree=2 varies it)",
+            );
+        }
+        return Ok(());
     }
     let made_gaussians = variant.avatar.is_gaussian() && variant.avatar.is_built();
     match variant.sh_degree {

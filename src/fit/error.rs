@@ -26,6 +26,21 @@ pub enum Error {
         /// What is wrong.
         source: StrategyError,
     },
+    /// An optimisation ran into numbers that are not finite.
+    #[error(
+        "sequence {sequence}: not finite at iteration {iteration} on frame {frame}: {parameter}; expected finite losses \
+         (smaller learning rates may help)"
+    )]
+    Diverged {
+        /// Id of the sequence.
+        sequence: String,
+        /// Iterations before it.
+        iteration: u32,
+        /// The training frame.
+        frame: String,
+        /// What is not finite.
+        parameter: String,
+    },
     /// A setting out of its range, or data that cannot give an avatar.
     #[error("{field}: {problem}; expected {expected}")]
     Invalid {

@@ -17,6 +17,7 @@ mod sighting;
 pub mod surface;
 mod tessellation;
 pub mod texture;
+pub mod train;
 mod training;
 
 pub use error::Error;

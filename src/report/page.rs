@@ -7,7 +7,8 @@ use crate::experiment::{ADDED_VARIANT, Options};
 /// The page: how it was made, what is missing, and the tables.
 pub fn page(results: &Results) -> String {
     let mut text = format!(
-        "# Results\n\nMade by `{}`. Nothing on this page depends on the time or the machine. The best value of a sequence \
+        "# Results\n\nMade by `{}`, on the data that the tables name (experiment files and a data folder are further \
+         arguments). Nothing on this page depends on the time or the machine. The best value of a sequence \
          is bold, judged on the printed digits; equal digits are equally good. ↑: more is better, ↓: less is better; \
          n/c: not computed.\n\n",
         command(results)

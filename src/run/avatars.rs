@@ -1,8 +1,9 @@
 //! Avatars that jobs need: built from training frames once, kept in the run's folder, read back bit for bit.
 
-use super::{Error, Library};
+use super::fitting::{self, FitEvent, FitFiles};
+use super::{Error, Event, Library};
 use crate::data::{Sequence, frames, npy, ply};
-use crate::experiment::{AvatarBuild, AvatarRecipe};
+use crate::experiment::{AvatarBuild, AvatarRecipe, PlannedFit};
 use crate::fit::surface::{BindTo, Placement, SurfaceInit, surface_init};
 use crate::fit::texture::{TextureInit, TexturedBody, gather_texture};
 use crate::render::mesh::Texture;
@@ -26,19 +27,49 @@ pub enum Prepared {
 ///
 /// # Errors
 /// Training frames that cannot be read or used, or a folder that cannot be written.
-pub fn prepare(build: &AvatarBuild, library: &Library, folder: &Path) -> Result<Prepared, Error> {
+pub fn prepare(
+    build: &AvatarBuild,
+    library: &Library,
+    folder: &Path,
+    watch: &(dyn Fn(Event) + Sync),
+) -> Result<Prepared, Error> {
     let sequence = training(build, library)?;
     let file = kept(build, folder);
     if let AvatarRecipe::TexturedMesh { size } = build.recipe {
         return Ok(Prepared::Textured(textured(&sequence, size, &file)?));
     }
-    let fresh = !file.is_file();
-    if fresh {
+    if let Some(planned) = &build.fit
+        && !file.is_file()
+    {
+        fit(build, planned, &sequence, file.clone(), folder, watch)?;
+    }
+    if !file.is_file() {
         let avatar = surface_init(&sequence, &surface_options(build))?;
         ply::write_avatar(&file, &avatar, &ply::Metadata::default(), ply::Encoding::LittleEndian)?;
     }
     let bound = BoundAvatar::new(&ply::read_avatar(&file)?, &sequence.body)?;
     Ok(Prepared::Gaussians(Box::new(bound)))
+}
+
+/// Fits an avatar into `file`.
+fn fit(
+    build: &AvatarBuild,
+    planned: &PlannedFit,
+    sequence: &Sequence,
+    file: PathBuf,
+    folder: &Path,
+    watch: &(dyn Fn(Event) + Sync),
+) -> Result<(), Error> {
+    let start = Some(folder.join(format!("{}.ply", planned.start)));
+    let files = FitFiles { avatar: file, start };
+    let name = format!("{}/{}/{}", build.dataset, build.subject, sequence.id);
+    fitting::fit(sequence, &planned.options, &name, &files, &mut |event| {
+        if let FitEvent::Step(step, _) = event {
+            watch(Event::Fitting(step));
+        }
+        Ok(())
+    })?;
+    Ok(())
 }
 
 /// The frames that an avatar is made from.

@@ -34,6 +34,14 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A checkpoint that cannot be read.
+    #[error("{}: {problem}; expected a checkpoint of a fit (remove the file to start anew)", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
     /// Data that the plan names and the library does not have.
     #[error("{name}: not among the data at hand; expected the data that the plan was made from")]
     Absent {

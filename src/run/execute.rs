@@ -6,6 +6,7 @@ use super::store::Store;
 use super::{Error, Library};
 use crate::data::Sequence;
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
+use crate::fit::train::Step;
 use crate::metrics::{self, Protocol};
 use crate::render::splat::Renderer;
 use rayon::prelude::*;
@@ -15,10 +16,12 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// What happened, for whoever watches.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// So many avatars have to be made or read before the frames.
     Avatars(usize),
+    /// An iteration of the fit of one of them is done.
+    Fitting(Step),
     /// One of them is there.
     AvatarReady,
     /// So many jobs are to be done.
@@ -74,7 +77,10 @@ pub(super) fn prepare_avatars(
     std::fs::create_dir_all(folder).map_err(|source| Error::Folder { path: folder.to_owned(), source })?;
     let mut avatars = Avatars::new();
     for build in builds {
-        avatars.insert(build.key.clone(), prepare(build, library, folder).map_err(|error| error.to_string()));
+        avatars.insert(
+            build.key.clone(),
+            prepare(build, library, folder, watch).map_err(|error| error.to_string()),
+        );
         watch(Event::AvatarReady);
     }
     Ok(avatars)

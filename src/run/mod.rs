@@ -6,8 +6,10 @@
 pub mod avatars;
 mod error;
 mod execute;
+pub mod fitting;
 mod frame;
 pub mod gallery;
+pub mod held_out;
 mod library;
 pub mod provenance;
 pub mod store;

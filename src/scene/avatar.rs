@@ -5,7 +5,7 @@ use glam::Vec3;
 
 /// Gaussians with the parameters of a 3DGS PLY, as stored there: nothing activated, so that a file round-trips bit for
 /// bit and an optimiser can step on them.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Gaussians {
     /// Positions, metres, in the rest pose of the body.
     pub means: Vec<Vec3>,
@@ -103,7 +103,7 @@ impl Gaussians {
 }
 
 /// Where face-bound Gaussians sit: `Σ barycentric_k v_k + offset * n` on a face of the body.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FaceBinding {
     /// Face index per Gaussian.
     pub faces: Vec<u32>,
@@ -114,7 +114,7 @@ pub struct FaceBinding {
 }
 
 /// How Gaussians move with a body.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Binding {
     /// Not at all: a static scene.
     Static,
@@ -125,7 +125,7 @@ pub enum Binding {
 }
 
 /// Canonical Gaussians and their binding.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Avatar {
     /// The Gaussians in the rest pose.
     pub gaussians: Gaussians,

@@ -3,7 +3,7 @@
 use super::SceneError;
 
 /// Joint indices and weights of each row (vertex or Gaussian). Rows sum to one within [`SkinWeights::SUM_TOLERANCE`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SkinWeights {
     offsets: Vec<u32>,
     joints: Vec<u16>,

@@ -44,6 +44,20 @@ pub struct Recipe {
     pub densify: Option<Densify>,
 }
 
+/// A recipe with a budget.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitOptions {
+    /// What is fitted, and to what.
+    pub recipe: Recipe,
+    /// Number of iterations, one training frame each.
+    pub iterations: u32,
+    /// Seed of the order of frames and of backgrounds.
+    pub seed: u64,
+    /// Edges of the surface on which Gaussians start are halved until none is longer, millimetres.
+    pub edge_mm: u32,
+}
+
 /// What is behind the avatar and the truth in the loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -236,6 +250,11 @@ impl Recipe {
         let full = usize::from(self.sh_degree);
         let step = (f64::from(self.sh_step) * f64::from(iterations)).round() as u32;
         if step == 0 { full } else { full.min((iteration / step) as usize) }
+    }
+
+    /// The recipe without its names: what a fit depends on.
+    pub fn choices(&self) -> Self {
+        Self { id: String::new(), title: String::new(), source: String::new(), ..self.clone() }
     }
 
     /// Checks every number.

@@ -1,0 +1,211 @@
+//! Fits that survive: an avatar is fitted once, a checkpoint beside it lets a killed fit go on, and a sidecar says how it
+//! was made.
+
+use super::Error;
+use crate::data::{Sequence, atomic, ply};
+use crate::experiment::{CodeVersions, FitOptions};
+use crate::fit::train::{self, Checkpoint, Step, Trainer};
+use crate::scene::Avatar;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Version of the sidecar's schema.
+pub const SCHEMA: u32 = 1;
+/// A checkpoint is written when so much time has passed since the last one.
+const BETWEEN_CHECKPOINTS: Duration = Duration::from_secs(20);
+/// The curve has about so many points.
+const CURVE_POINTS: u32 = 100;
+
+/// Where the parts of a fit are kept.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FitFiles {
+    /// The avatar, a 3DGS PLY with its binding.
+    pub avatar: PathBuf,
+    /// The avatar with which it starts, kept for other recipes; made anew if none.
+    pub start: Option<PathBuf>,
+}
+
+impl FitFiles {
+    /// The checkpoint beside the avatar; gone when the avatar is there.
+    pub fn checkpoint(&self) -> PathBuf {
+        self.avatar.with_extension("checkpoint")
+    }
+
+    /// The sidecar beside the avatar.
+    pub fn sidecar(&self) -> PathBuf {
+        self.avatar.with_extension("json")
+    }
+}
+
+/// How an avatar was fitted: the sidecar.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FitReport {
+    /// Version of this schema.
+    pub schema: u32,
+    /// Versions of the code.
+    pub code: CodeVersions,
+    /// Data set, subject and sequence.
+    pub trained_on: String,
+    /// Names of the training frames.
+    pub frames: Vec<String>,
+    /// Recipe and budget.
+    pub options: FitOptions,
+    /// Number of Gaussians in the end.
+    pub splats: usize,
+    /// About a hundred points of the way, each the mean over the iterations since the last one.
+    pub curve: Vec<Step>,
+    /// Held-out scores, where they were asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held_out: Vec<HeldOut>,
+    /// What was wrong with the data, but not fatally.
+    pub warnings: Vec<String>,
+}
+
+/// The score on frames that the fit did not see.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// Iterations done; 0 is the start.
+    pub iteration: u32,
+    /// The sequence.
+    pub sequence: String,
+    /// Mean PSNR over its frames, dB.
+    pub psnr: f64,
+    /// Mean SSIM over its frames.
+    pub ssim: f64,
+    /// Number of frames.
+    pub frames: usize,
+}
+
+/// What is said while a fit goes on.
+pub enum FitEvent<'a> {
+    /// The avatar with which it starts is being made.
+    Starting,
+    /// An iteration is done; the avatar as it stands.
+    Step(Step, &'a Avatar),
+    /// Something is wrong with the data, but not fatally.
+    Warning(&'a str),
+}
+
+/// Fits an avatar and writes it, unless it is there. The file's bits do not depend on how often the fit was interrupted.
+///
+/// # Errors
+/// Training frames that cannot be used, a fit that diverges (the last checkpoint stays), files that cannot be written.
+/// `watch` may stop the fit with an error of its own; the checkpoint of that moment stays.
+pub fn fit(
+    sequence: &Sequence,
+    options: &FitOptions,
+    trained_on: &str,
+    files: &FitFiles,
+    watch: &mut dyn FnMut(FitEvent<'_>) -> Result<(), Error>,
+) -> Result<FitReport, Error> {
+    let path = files.checkpoint();
+    let mut progress = Progress::load(&path)?;
+    let mut trainer = match progress.checkpoint.take() {
+        Some(checkpoint) => Trainer::resume(sequence, options, checkpoint)?,
+        None => {
+            watch(FitEvent::Starting)?;
+            Trainer::new(sequence, options, start(sequence, options, files)?)?
+        }
+    };
+    let mut saved = Instant::now();
+    while !trainer.is_done() {
+        let step = trainer.step()?;
+        for warning in trainer.take_warnings() {
+            watch(FitEvent::Warning(&warning))?;
+            progress.note_warning(warning);
+        }
+        progress.note(step);
+        let stop = watch(FitEvent::Step(step, trainer.avatar()));
+        if stop.is_err() || saved.elapsed() > BETWEEN_CHECKPOINTS {
+            progress.save(&path, trainer.checkpoint())?;
+            saved = Instant::now();
+        }
+        stop?;
+    }
+    let report = FitReport {
+        schema: SCHEMA,
+        code: CodeVersions::CURRENT,
+        trained_on: trained_on.to_owned(),
+        frames: sequence.frames.iter().map(|frame| frame.name.clone()).collect(),
+        options: options.clone(),
+        splats: trainer.avatar().gaussians.len(),
+        curve: progress.curve,
+        held_out: Vec::new(),
+        warnings: progress.warnings,
+    };
+    write_report(&files.sidecar(), &report)?;
+    let metadata = ply::Metadata::default();
+    ply::write_avatar(&files.avatar, trainer.avatar(), &metadata, ply::Encoding::LittleEndian)?;
+    if path.is_file() {
+        std::fs::remove_file(&path).map_err(|source| Error::Folder { path, source })?;
+    }
+    Ok(report)
+}
+
+/// Writes a sidecar.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_report(path: &Path, report: &FitReport) -> Result<(), Error> {
+    let text = serde_json::to_string_pretty(report).expect("a report serialises") + "\n";
+    Ok(atomic::write(path, |w| w.write_all(text.as_bytes()))?)
+}
+
+/// The avatar with which a fit starts. It is read back from its file, so that it is the same whoever made it.
+fn start(sequence: &Sequence, options: &FitOptions, files: &FitFiles) -> Result<Avatar, Error> {
+    let Some(path) = &files.start else { return Ok(train::start(sequence, options)?) };
+    if !path.is_file() {
+        let avatar = train::start(sequence, options)?;
+        ply::write_avatar(path, &avatar, &ply::Metadata::default(), ply::Encoding::LittleEndian)?;
+    }
+    Ok(ply::read_avatar(path)?)
+}
+
+/// What a checkpoint file holds.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Progress {
+    checkpoint: Option<Checkpoint>,
+    curve: Vec<Step>,
+    /// Sums of loss and PSNR since the last point of the curve, and their number.
+    since: (f64, f64, u32),
+    warnings: Vec<String>,
+}
+
+impl Progress {
+    fn load(path: &Path) -> Result<Self, Error> {
+        if !path.is_file() {
+            return Ok(Self::default());
+        }
+        let bytes = std::fs::read(path).map_err(|source| Error::Folder { path: path.into(), source })?;
+        postcard::from_bytes(&bytes)
+            .map_err(|error| Error::Checkpoint { path: path.into(), problem: error.to_string() })
+    }
+
+    fn save(&mut self, path: &Path, checkpoint: Checkpoint) -> Result<(), Error> {
+        self.checkpoint = Some(checkpoint);
+        let bytes = postcard::to_stdvec(self).expect("every type here serialises");
+        self.checkpoint = None;
+        Ok(atomic::write(path, |w| w.write_all(&bytes))?)
+    }
+
+    fn note(&mut self, step: Step) {
+        let (loss, psnr, count) = &mut self.since;
+        *loss += step.loss;
+        *psnr += step.psnr;
+        *count += 1;
+        let every = step.iterations.div_ceil(CURVE_POINTS);
+        if step.iteration % every == 0 || step.iteration == step.iterations {
+            let n = f64::from(*count);
+            self.curve.push(Step { loss: *loss / n, psnr: *psnr / n, ..step });
+            self.since = (0.0, 0.0, 0);
+        }
+    }
+
+    fn note_warning(&mut self, warning: String) {
+        if !self.warnings.contains(&warning) {
+            self.warnings.push(warning);
+        }
+    }
+}

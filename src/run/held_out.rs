@@ -1,0 +1,44 @@
+//! How good an avatar is on frames that its fit did not see.
+
+use super::Error;
+use super::fitting::HeldOut;
+use crate::data::Sequence;
+use crate::metrics::{self, Protocol};
+use crate::render::splat::{RenderSettings, Renderer};
+use crate::scene::{Avatar, PosedBody};
+use crate::strategy::{BoundAvatar, Strategy, pose};
+use rayon::prelude::*;
+
+/// Poses, renders and scores an avatar on every frame of a sequence, by the default protocol.
+///
+/// # Errors
+/// A frame that cannot be read or scored, an avatar that does not fit the sequence's body.
+pub fn held_out(
+    avatar: &Avatar,
+    strategy: &Strategy,
+    sequence: &Sequence,
+    iteration: u32,
+) -> Result<HeldOut, Error> {
+    let protocol = Protocol::parse("default")?;
+    let background = protocol.background_colour().unwrap_or([1.0; 3]);
+    let settings = RenderSettings { background, antialiased: false };
+    let bound = BoundAvatar::new(avatar, &sequence.body)?;
+    let score = |renderer: &mut Renderer, index: usize| {
+        let truth = sequence.truth(index)?;
+        let frame = &sequence.frames[index];
+        let body = PosedBody::new(&sequence.body, &sequence.poses[frame.pose])?;
+        let posed = pose(&bound, &body, strategy)?;
+        let image = renderer.render(&posed, &sequence.cameras[frame.camera], &settings).image;
+        Ok(protocol.score(&image, metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha })?)
+    };
+    let frames = (0..sequence.frames.len()).into_par_iter();
+    let scores = frames.map_init(Renderer::new, score).collect::<Result<Vec<_>, Error>>()?;
+    let summary = protocol.aggregate(&scores)?;
+    Ok(HeldOut {
+        iteration,
+        sequence: sequence.id.clone(),
+        psnr: summary.psnr,
+        ssim: summary.ssim,
+        frames: scores.len(),
+    })
+}

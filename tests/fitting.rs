@@ -1,0 +1,221 @@
+//! Fitting end to end on the embedded subject, small: it helps on frames it has not seen, it is deterministic, it survives
+//! an interruption, and it says what is wrong.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use skinsplat::data::registry::Registry;
+use skinsplat::data::{FrameGenerator, FrameRef, FrameSource, Sequence, Subject, Truth};
+use skinsplat::experiment::{FitOptions, RECIPES, Recipe};
+use skinsplat::fit::Error;
+use skinsplat::fit::train::{Trainer, start};
+use skinsplat::run::held_out::held_out;
+use skinsplat::scene::{Avatar, Binding, Image, Mask};
+use std::sync::Arc;
+
+/// The embedded subject, its first frames, at 96 pixels.
+fn subject() -> Subject {
+    let registry = Registry::embedded();
+    let dataset = registry.datasets.iter().find(|d| d.id == "snapshot_ava").unwrap();
+    dataset.load(&Default::default()).unwrap().remove(0)
+}
+
+fn small(sequence: &Sequence, frames: usize) -> Sequence {
+    let count = sequence.frames.len();
+    let chosen: Vec<usize> = (0..frames).map(|i| i * count / frames).collect();
+    sequence.selected(&chosen).unwrap().reduced(96)
+}
+
+fn options(recipe: &str, iterations: u32) -> FitOptions {
+    FitOptions { recipe: Recipe::parse(recipe).unwrap(), iterations, seed: 3, edge_mm: 40 }
+}
+
+fn fitted(sequence: &Sequence, options: &FitOptions) -> Avatar {
+    let mut trainer = Trainer::new(sequence, options, start(sequence, options).unwrap()).unwrap();
+    while !trainer.is_done() {
+        trainer.step().unwrap();
+    }
+    trainer.avatar().clone()
+}
+
+/// Every recipe improves on its start, on poses that it has not seen, within a minute's worth of iterations.
+#[test]
+fn every_recipe_improves_on_its_start_on_held_out_poses() {
+    let subject = subject();
+    let (training, test) = (small(&subject.train[0], 6), small(&subject.test[0], 4));
+    for recipe in RECIPES.iter().filter(|recipe| recipe.id != "pure-skinned") {
+        let options = options(&recipe.id, 60);
+        let strategy = recipe.strategy.parse().unwrap();
+        let first = start(&training, &options).unwrap();
+        let before = held_out(&first, &strategy, &test, 0).unwrap();
+        let avatar = fitted(&training, &options);
+        let after = held_out(&avatar, &strategy, &test, 60).unwrap();
+        assert!(after.psnr > before.psnr + 0.5, "{}: {} dB to {} dB", recipe.id, before.psnr, after.psnr);
+        assert_eq!(avatar.gaussians.sh_degree, usize::from(recipe.sh_degree), "{}", recipe.id);
+        let fixed = recipe.densify.is_none();
+        assert!(!fixed || avatar.gaussians.len() == first.gaussians.len(), "{}", recipe.id);
+        avatar.validate(Some(&training.body)).unwrap();
+    }
+}
+
+#[test]
+fn an_interrupted_fit_ends_in_the_same_bits_on_any_number_of_threads() {
+    let training = small(&subject().train[0], 4);
+    for recipe in ["hugs-original", "splattingavatar-skinned", "ihuman-original"] {
+        let options = options(recipe, 24);
+        let first = start(&training, &options).unwrap();
+        let whole = fitted(&training, &options);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let resumed = pool.install(|| {
+            let mut trainer = Trainer::new(&training, &options, first.clone()).unwrap();
+            for _ in 0..13 {
+                trainer.step().unwrap();
+            }
+            let bytes = postcard::to_stdvec(&trainer.checkpoint()).unwrap();
+            let checkpoint = postcard::from_bytes(&bytes).unwrap();
+            let mut trainer = Trainer::resume(&training, &options, checkpoint).unwrap();
+            while !trainer.is_done() {
+                trainer.step().unwrap();
+            }
+            trainer.avatar().clone()
+        });
+        assert_eq!(whole, resumed, "{recipe}");
+        assert_ne!(whole, first);
+    }
+}
+
+#[test]
+fn a_checkpoint_of_another_fit_is_refused() {
+    let training = small(&subject().train[0], 2);
+    let (mine, other) = (options("animatable-skinned", 10), options("animatable-skinned", 11));
+    let trainer = Trainer::new(&training, &mine, start(&training, &mine).unwrap()).unwrap();
+    let error = Trainer::resume(&training, &other, trainer.checkpoint()).err().unwrap();
+    assert!(error.to_string().contains("another fit"), "{error}");
+}
+
+#[test]
+fn only_what_is_free_changes() {
+    let training = small(&subject().train[0], 2);
+    let fixed = "animatable-skinned+free.position=fixed+free.rotation=fixed+free.scale=fixed+free.opacity=false";
+    let options = options(fixed, 5);
+    let first = start(&training, &options).unwrap();
+    let after = fitted(&training, &options);
+    assert_eq!(first.gaussians.means, after.gaussians.means);
+    assert_eq!(first.gaussians.rotations, after.gaussians.rotations);
+    assert_eq!(first.gaussians.log_scales, after.gaussians.log_scales);
+    assert_eq!(first.gaussians.opacity_logits, after.gaussians.opacity_logits);
+    assert_ne!(first.gaussians.sh, after.gaussians.sh);
+
+    let along = self::options("animatable-skinned+free.position=along-normal+free.rotation=about-normal", 5);
+    let after = fitted(&training, &along);
+    let normal = |avatar: &Avatar, i: usize| {
+        let [w, x, y, z] = avatar.gaussians.unit_rotations()[i];
+        glam::Quat::from_xyzw(x, y, z, w) * glam::Vec3::Z
+    };
+    for i in (0..first.gaussians.len()).step_by(37) {
+        let (before, now) = (normal(&first, i), normal(&after, i));
+        assert!(before.dot(now) > 1.0 - 1e-5, "the normal stays");
+        let way = after.gaussians.means[i] - first.gaussians.means[i];
+        assert!(way.cross(before).length() < 1e-6, "the way is along the normal");
+    }
+}
+
+#[test]
+fn splitting_and_walking_change_the_number_and_keep_the_binding() {
+    let training = small(&subject().train[0], 4);
+    let recipe = "splattingavatar-skinned+densify.gradient=1e-7+densify.split_above=0.02+densify.most=1.5";
+    let options = options(recipe, 30);
+    let first = start(&training, &options).unwrap();
+    let after = fitted(&training, &options);
+    assert!(after.gaussians.len() > first.gaussians.len());
+    assert!(after.gaussians.len() <= first.gaussians.len() * 3 / 2);
+    let Binding::Face(binding) = &after.binding else { panic!("still bound to faces") };
+    let inside = binding.barycentric.iter().filter(|b| b.iter().all(|&v| v > -0.5)).count();
+    assert!(inside as f64 > 0.95 * after.gaussians.len() as f64, "those that slide out walk on");
+}
+
+/// Frames that a test breaks.
+#[derive(Debug)]
+struct Broken {
+    truths: Vec<Truth>,
+}
+
+impl FrameGenerator for Broken {
+    fn truth(&self, frame: usize) -> Truth {
+        self.truths[frame].clone()
+    }
+
+    fn key(&self) -> String {
+        "broken".to_owned()
+    }
+}
+
+/// The sequence with its truths changed.
+fn broken(sequence: &Sequence, change: impl Fn(usize, &mut Truth)) -> Sequence {
+    let mut truths: Vec<Truth> =
+        (0..sequence.frames.len()).map(|i| sequence.truth(i).unwrap()).collect();
+    truths.iter_mut().enumerate().for_each(|(i, truth)| change(i, truth));
+    let generator = Arc::new(Broken { truths });
+    let frames = sequence.frames.iter().enumerate().map(|(frame, old)| FrameRef {
+        source: FrameSource::Generated { generator: generator.clone(), frame },
+        ..old.clone()
+    });
+    Sequence { frames: frames.collect(), stored_sizes: None, ..sequence.clone() }
+}
+
+fn emptied(truth: &mut Truth) {
+    truth.alpha = Mask::filled(truth.alpha.width(), truth.alpha.height(), 0.0);
+}
+
+#[test]
+fn useless_frames_are_passed_over_with_a_warning_and_refused_if_there_is_no_other() {
+    let training = small(&subject().train[0], 3);
+    let options = options("animatable-skinned", 6);
+    let first = start(&training, &options).unwrap();
+    let one = broken(&training, |i, truth| {
+        if i == 1 {
+            emptied(truth);
+        }
+    });
+    let mut trainer = Trainer::new(&one, &options, first.clone()).unwrap();
+    while !trainer.is_done() {
+        trainer.step().unwrap();
+    }
+    let warnings = trainer.take_warnings();
+    assert_eq!(warnings.len(), 1);
+    assert!(warnings[0].contains("its mask is empty"), "{warnings:?}");
+
+    let corner = broken(&training, |_, truth| {
+        emptied(truth);
+        truth.alpha.values_mut()[0] = 1.0;
+    });
+    let mut trainer = Trainer::new(&corner, &options, first.clone()).unwrap();
+    let error = trainer.step().unwrap_err();
+    assert!(error.to_string().contains("none of 3 can be used"), "{error}");
+    assert!(trainer.take_warnings()[0].contains("misses the body"));
+
+    let mut away = training.clone();
+    for camera in &mut away.cameras {
+        camera.cx += 1e4;
+    }
+    let mut trainer = Trainer::new(&away, &options, first).unwrap();
+    assert!(trainer.step().is_err());
+    assert!(trainer.take_warnings()[0].contains("outside the image"));
+}
+
+#[test]
+fn numbers_that_are_not_finite_stop_a_fit_by_name() {
+    let training = small(&subject().train[0], 2);
+    let options = options("animatable-skinned", 6);
+    let first = start(&training, &options).unwrap();
+    let nan = broken(&training, |_, truth| {
+        let (width, height) = (truth.rgb.width(), truth.rgb.height());
+        truth.rgb = Image::filled(width, height, [f32::NAN; 3]);
+    });
+    let mut trainer = Trainer::new(&nan, &options, first).unwrap();
+    match trainer.step().unwrap_err() {
+        Error::Diverged { iteration: 0, frame, parameter, .. } => {
+            assert!(nan.frames.iter().any(|f| f.name == frame));
+            assert!(parameter.contains("of Gaussian"), "{parameter}");
+        }
+        other => panic!("{other}"),
+    }
+}
