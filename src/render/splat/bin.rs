@@ -48,13 +48,32 @@ pub(super) struct Bins {
     /// `entries[ends[s - 1]..ends[s]]` belong to strip s.
     ends: Vec<u32>,
     splats: usize,
+    /// One bit per Gaussian of the chunk, sixteen in a row: which of them were entered.
+    visible: Vec<u16>,
 }
 
 impl Bins {
     #[inline(always)]
     pub(super) fn clear(&mut self) {
         self.pairs.clear();
+        self.visible.clear();
         self.splats = 0;
+    }
+
+    /// Notes which of the next sixteen Gaussians were entered.
+    #[inline(always)]
+    pub(super) fn push_visible(&mut self, sixteen: u16) {
+        self.visible.push(sixteen);
+    }
+
+    /// Which Gaussians of the chunk were entered: one bit each, sixteen in a row.
+    pub(super) fn visible(&self) -> &[u16] {
+        &self.visible
+    }
+
+    /// Number of strips that splats were sorted into.
+    pub(super) fn strips(&self) -> usize {
+        self.ends.len().saturating_sub(1)
     }
 
     /// Number of splats that were entered.

@@ -5,15 +5,17 @@ use super::preprocess::{Paint, Splat};
 use super::wide::{Wide, each};
 
 /// Alpha never exceeds this.
-const MAX_ALPHA: f32 = 0.99;
+pub(super) const MAX_ALPHA: f32 = 0.99;
 /// A splat that would leave less transmittance than this is not blended, and the pixel is done.
-const LEAST_TRANSMITTANCE: f32 = 1e-4;
+pub(super) const LEAST_TRANSMITTANCE: f32 = 1e-4;
 /// Splats between two looks at whether all pixels of the block are done.
-const BETWEEN_CHECKS: usize = 8;
+pub(super) const BETWEEN_CHECKS: usize = 8;
 
 /// Columns and rows of a block's pixels.
-const COLUMN: [f32; 16] = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
-const ROW: [f32; 16] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
+pub(super) const COLUMN: [f32; 16] =
+    [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
+pub(super) const ROW: [f32; 16] =
+    [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
 
 /// Sixteen pixels while they are blended, row by row.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +77,7 @@ impl Block {
             }
             for &i in run {
                 let paint = &splats[usize::from(i)].paint;
-                let alpha = alpha(paint, x, y);
+                let alpha = uncapped_alpha(paint, x, y).min(n(MAX_ALPHA));
                 // Without a branch: pixels finish at different splats, which no processor predicts.
                 let after = alpha.neg_mul_add(open, open);
                 let enough = after.at_least(n(LEAST_TRANSMITTANCE));
@@ -95,20 +97,19 @@ impl Block {
     }
 }
 
-/// `min(0.99, opacity 2^-q)` where 0 <= q <= reach, else 0; so a q that rounding made negative is skipped, as is NaN.
+/// `opacity 2^-q` where 0 <= q <= reach, else 0; so a q that rounding made negative is skipped, as is NaN.
 #[inline(always)]
-fn alpha<L: Lanes>(paint: &Paint, x: Wide<L>, y: Wide<L>) -> Wide<L> {
+pub(super) fn uncapped_alpha<L: Lanes>(paint: &Paint, x: Wide<L>, y: Wide<L>) -> Wide<L> {
     let n = |value: f32| x.constant(value);
     let [a, b, c] = each(paint.conic, n);
     let (dx, dy) = (x - n(paint.mean[0]), y - n(paint.mean[1]));
     let q = dx.mul_add(a.mul_add(dx, b * dy), c * dy * dy);
-    let value = (n(paint.opacity) * q.exp2_negated()).min(n(MAX_ALPHA));
-    q.in_range(n(paint.reach)).keep(value)
+    q.in_range(n(paint.reach)).keep(n(paint.opacity) * q.exp2_negated())
 }
 
 /// The alpha of a splat at one pixel.
 #[cfg(test)]
 pub(super) fn alpha_at(paint: &Paint, x: f32, y: f32) -> f32 {
     let l = super::lanes::Arrays;
-    alpha(paint, Wide::splat(l, x), Wide::splat(l, y)).store()[0]
+    uncapped_alpha(paint, Wide::splat(l, x), Wide::splat(l, y)).store()[0].min(MAX_ALPHA)
 }

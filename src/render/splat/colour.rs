@@ -5,15 +5,15 @@ use super::wide::{Wide, each};
 use crate::scene::ColourClamp;
 
 const C0: f32 = 0.282_094_791_773_878_14;
-const C1: f32 = 0.488_602_511_902_919_9;
-const C2: [f32; 5] = [
+pub(super) const C1: f32 = 0.488_602_511_902_919_9;
+pub(super) const C2: [f32; 5] = [
     1.092_548_430_592_079_2,
     -1.092_548_430_592_079_2,
     0.315_391_565_252_520_05,
     -1.092_548_430_592_079_2,
     0.546_274_215_296_039_6,
 ];
-const C3: [f32; 7] = [
+pub(super) const C3: [f32; 7] = [
     -0.590_043_589_926_643_5,
     2.890_611_442_640_554,
     -0.457_045_799_464_465_8,
@@ -50,14 +50,22 @@ pub(super) fn basis<L: Lanes>([x, y, z]: [Wide<L>; 3]) -> [Wide<L>; 16] {
     ]
 }
 
-/// The direction in which the SH of a Gaussian are read: `normalize(F (mean - camera))`, 0 where that vanishes. F by
-/// columns.
+/// The direction in which the SH of a Gaussian are read.
+#[derive(Clone, Copy)]
+pub(super) struct Direction<L: Lanes> {
+    /// `normalize(F (mean - camera))`, 0 where that vanishes.
+    pub(super) unit: [Wide<L>; 3],
+    /// `1 / |F (mean - camera)|`, 0 where that vanishes.
+    pub(super) inverse_length: Wide<L>,
+}
+
+/// The direction in which SH are read. F by columns.
 #[inline(always)]
 pub(super) fn direction<L: Lanes>(
     mean: [Wide<L>; 3],
     camera: [f32; 3],
     frame: Option<[[Wide<L>; 3]; 3]>,
-) -> [Wide<L>; 3] {
+) -> Direction<L> {
     let n = |value: f32| mean[0].constant(value);
     let d = each([0, 1, 2], |i| mean[i] - n(camera[i]));
     let turned = match frame {
@@ -65,8 +73,8 @@ pub(super) fn direction<L: Lanes>(
         None => d,
     };
     let square = turned[2].mul_add(turned[2], turned[1].mul_add(turned[1], turned[0] * turned[0]));
-    let scale = n(0.0).less(square).keep(n(1.0) / square.sqrt());
-    each(turned, |v| v * scale)
+    let inverse_length = n(0.0).less(square).keep(n(1.0) / square.sqrt());
+    Direction { unit: each(turned, |v| v * inverse_length), inverse_length }
 }
 
 /// `Σ b_k c_k + 1/2`, before clamping, of one Gaussian. `coefficients` are RGB triples, as many as the degree has;

@@ -49,6 +49,8 @@ pub(super) trait Lanes: Copy {
     fn keep(self, mask: Self::M, a: Self::F) -> Self::F;
     /// `a` where the mask is set, else `b`.
     fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F;
+    /// Lane j of row i becomes lane i of row j.
+    fn transpose(self, rows: &[Self::F; 16]) -> [Self::F; 16];
 }
 
 /// Bits of the mantissa of an `f32`.
@@ -274,5 +276,9 @@ impl Lanes for Arrays {
     #[inline(always)]
     fn select(self, mask: [bool; 16], a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
         std::array::from_fn(|i| if mask[i] { a[i] } else { b[i] })
+    }
+    #[inline(always)]
+    fn transpose(self, rows: &[[f32; 16]; 16]) -> [[f32; 16]; 16] {
+        std::array::from_fn(|j| std::array::from_fn(|i| rows[i][j]))
     }
 }

@@ -119,6 +119,36 @@ impl Lanes for V4 {
     fn select(self, mask: pulp::b16, a: f32x16, b: f32x16) -> f32x16 {
         self.select_f32x16(mask, a, b)
     }
+    #[inline(always)]
+    fn transpose(self, rows: &[f32x16; 16]) -> [f32x16; 16] {
+        let ops = self.avx512f;
+        let mut out = *rows;
+        // In each quarter of a register: the 4x4 transpose of four rows.
+        for four in out.chunks_exact_mut(4) {
+            let [a, b, c, d] = [cast(four[0]), cast(four[1]), cast(four[2]), cast(four[3])];
+            let (ab_low, ab_high) = (ops._mm512_unpacklo_ps(a, b), ops._mm512_unpackhi_ps(a, b));
+            let (cd_low, cd_high) = (ops._mm512_unpacklo_ps(c, d), ops._mm512_unpackhi_ps(c, d));
+            four[0] = cast(ops._mm512_unpacklo_pd(cast(ab_low), cast(cd_low)));
+            four[1] = cast(ops._mm512_unpackhi_pd(cast(ab_low), cast(cd_low)));
+            four[2] = cast(ops._mm512_unpacklo_pd(cast(ab_high), cast(cd_high)));
+            four[3] = cast(ops._mm512_unpackhi_pd(cast(ab_high), cast(cd_high)));
+        }
+        // The 4x4 transpose of quarters.
+        const EVEN: i32 = 0b10_00_10_00;
+        const ODD: i32 = 0b11_01_11_01;
+        for i in 0..4 {
+            let [a, b, c, d] = [cast(out[i]), cast(out[4 + i]), cast(out[8 + i]), cast(out[12 + i])];
+            let (ab_even, ab_odd) =
+                (ops._mm512_shuffle_f32x4::<EVEN>(a, b), ops._mm512_shuffle_f32x4::<ODD>(a, b));
+            let (cd_even, cd_odd) =
+                (ops._mm512_shuffle_f32x4::<EVEN>(c, d), ops._mm512_shuffle_f32x4::<ODD>(c, d));
+            out[i] = cast(ops._mm512_shuffle_f32x4::<EVEN>(ab_even, cd_even));
+            out[4 + i] = cast(ops._mm512_shuffle_f32x4::<EVEN>(ab_odd, cd_odd));
+            out[8 + i] = cast(ops._mm512_shuffle_f32x4::<ODD>(ab_even, cd_even));
+            out[12 + i] = cast(ops._mm512_shuffle_f32x4::<ODD>(ab_odd, cd_odd));
+        }
+        out
+    }
 }
 
 const SHIFT: i32 = MANTISSA_BITS as i32;
@@ -259,4 +289,43 @@ impl Lanes for V3 {
     fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F {
         [self.select_f32x8(mask[0], a[0], b[0]), self.select_f32x8(mask[1], a[1], b[1])]
     }
+    #[inline(always)]
+    fn transpose(self, rows: &[Self::F; 16]) -> [Self::F; 16] {
+        let mut out = *rows;
+        for top in [0, 8] {
+            for half in [0, 1] {
+                let mut square = [rows[0][0]; 8];
+                for i in 0..8 {
+                    square[i] = rows[top + i][half];
+                }
+                let square = transpose_eight(self, square);
+                for i in 0..8 {
+                    out[8 * half + i][top / 8] = square[i];
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Lane j of row i becomes lane i of row j.
+#[inline(always)]
+fn transpose_eight(simd: V3, mut rows: [f32x8; 8]) -> [f32x8; 8] {
+    let ops = simd.avx;
+    // In each half of a register: the 4x4 transpose of four rows.
+    for four in rows.chunks_exact_mut(4) {
+        let [a, b, c, d] = [cast(four[0]), cast(four[1]), cast(four[2]), cast(four[3])];
+        let (ab_low, ab_high) = (ops._mm256_unpacklo_ps(a, b), ops._mm256_unpackhi_ps(a, b));
+        let (cd_low, cd_high) = (ops._mm256_unpacklo_ps(c, d), ops._mm256_unpackhi_ps(c, d));
+        four[0] = cast(ops._mm256_unpacklo_pd(cast(ab_low), cast(cd_low)));
+        four[1] = cast(ops._mm256_unpackhi_pd(cast(ab_low), cast(cd_low)));
+        four[2] = cast(ops._mm256_unpacklo_pd(cast(ab_high), cast(cd_high)));
+        four[3] = cast(ops._mm256_unpackhi_pd(cast(ab_high), cast(cd_high)));
+    }
+    for i in 0..4 {
+        let (a, b) = (cast(rows[i]), cast(rows[4 + i]));
+        rows[i] = cast(ops._mm256_permute2f128_ps::<0x20>(a, b));
+        rows[4 + i] = cast(ops._mm256_permute2f128_ps::<0x31>(a, b));
+    }
+    rows
 }

@@ -16,6 +16,12 @@
 //! - The screen covariance is the Gram matrix of J W M, which equals J W Σ Wᵀ Jᵀ and rounds better.
 //! - Antialiasing follows the original's later version: opacity times `sqrt(max(0.000025, det / det_low_passed))`.
 
+mod backward;
+mod backward_blend;
+mod backward_colour;
+mod backward_gaussian;
+mod backward_project;
+mod backward_strip;
 mod bin;
 mod blend;
 mod colour;
@@ -31,6 +37,7 @@ mod reach;
 mod strip;
 mod wide;
 
+pub use backward::Derivatives;
 pub use lanes::SimdLevel;
 pub use profile::{Phase, PhaseTimes};
 
@@ -74,6 +81,7 @@ pub struct Renderer {
     splats: Vec<Splat>,
     bins: Vec<Bins>,
     scratch: Vec<Mutex<Scratch>>,
+    backward: backward::Memory,
 }
 
 impl Default for Renderer {
@@ -94,7 +102,7 @@ impl Renderer {
     }
 
     fn with_simd(simd: Simd) -> Self {
-        Self { simd, splats: Vec::new(), bins: Vec::new(), scratch: Vec::new() }
+        Self { simd, splats: Vec::new(), bins: Vec::new(), scratch: Vec::new(), backward: Default::default() }
     }
 
     /// Number of Gaussians that reached the image of the last frame drawn.
@@ -218,7 +226,7 @@ fn chunk_length(count: usize) -> usize {
 }
 
 /// Runs `work` with this thread's scratch.
-fn with_scratch(scratch: &[Mutex<Scratch>], work: impl FnOnce(&mut Scratch)) {
+fn with_scratch<S>(scratch: &[Mutex<S>], work: impl FnOnce(&mut S)) {
     let thread = rayon::current_thread_index().unwrap_or(0) % scratch.len();
     work(&mut scratch[thread].lock().unwrap_or_else(PoisonError::into_inner));
 }

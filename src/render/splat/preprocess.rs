@@ -7,7 +7,7 @@ use super::project::{Ellipse, HALF_LOG2_E, Projected, View, project};
 use super::wide::{Wide, each};
 use crate::scene::Posed;
 
-const LANES: usize = 16;
+pub(super) const LANES: usize = 16;
 
 /// Everything that the later phases read of a visible Gaussian: one cache line.
 #[derive(Clone, Copy, Debug, Default)]
@@ -73,6 +73,7 @@ impl Kernel for Preprocess<'_> {
             let group = Group::load(posed, base, count);
             let projected = group.project(l, view).map(|row| row.store());
             let basis = each(group.basis(l, view), Wide::store);
+            let mut visible = 0_u16;
             for lane in 0..count {
                 if projected.visible[lane] == 0.0 {
                     continue;
@@ -92,24 +93,28 @@ impl Kernel for Preprocess<'_> {
                 };
                 bins.push(grid, (first + written) as u32, p.depth, tiles);
                 written += 1;
+                visible |= 1 << lane;
             }
+            bins.push_visible(visible);
         }
         bins.finish(grid);
     }
 }
 
 /// Sixteen Gaussians, one number of each per row.
-struct Group {
-    means: [[f32; LANES]; 3],
-    factors: [[[f32; LANES]; 3]; 3],
-    frames: Option<[[[f32; LANES]; 3]; 3]>,
-    opacities: [f32; LANES],
+pub(super) struct Group {
+    pub(super) means: [[f32; LANES]; 3],
+    /// By columns.
+    pub(super) factors: [[[f32; LANES]; 3]; 3],
+    /// By columns.
+    pub(super) frames: Option<[[[f32; LANES]; 3]; 3]>,
+    pub(super) opacities: [f32; LANES],
 }
 
 impl Group {
     /// `count` Gaussians from `base` on; the other lanes have opacity 0 and so are culled.
     #[inline(always)]
-    fn load(posed: &Posed, base: usize, count: usize) -> Self {
+    pub(super) fn load(posed: &Posed, base: usize, count: usize) -> Self {
         let range = base..base + count;
         let mut means = [[0.0; LANES]; 3];
         for (lane, mean) in posed.means[range.clone()].iter().enumerate() {
@@ -133,7 +138,7 @@ impl Group {
     fn basis<L: Lanes>(&self, l: L, view: &View) -> [Wide<L>; 16] {
         let load = |row: [f32; LANES]| Wide::load(l, &row);
         let frames = self.frames.map(|frames| each(frames, |column| each(column, load)));
-        colour::basis(colour::direction(each(self.means, load), view.position, frames))
+        colour::basis(colour::direction(each(self.means, load), view.position, frames).unit)
     }
 }
 

@@ -15,9 +15,9 @@ const NEAR: f32 = 0.2;
 /// The projection is linearised no further out than this multiple of the half field of view.
 const JACOBIAN_LIMIT: f32 = 1.3;
 /// Variance added to both screen axes, pixels².
-const LOW_PASS: f32 = 0.3;
+pub(super) const LOW_PASS: f32 = 0.3;
 /// Least ratio of determinants before and after the low-pass that the antialiasing factor may take the root of.
-const LEAST_COMPENSATION: f32 = 0.000_025;
+pub(super) const LEAST_COMPENSATION: f32 = 0.000_025;
 /// Pixels by which culling bounds are widened: more than the rounding of any position in the image.
 pub(super) const SAFETY: f32 = 0.01;
 /// `log2(e) / 2`: turns `dᵀ Σ⁻¹ d` into a power of two.
@@ -31,18 +31,18 @@ const MAX_OPACITY: f32 = 1e30;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
     /// First three rows of the world-to-camera transform.
-    rows: [[f32; 4]; 3],
+    pub(super) rows: [[f32; 4]; 3],
     /// x and y rows of projection times world-to-camera.
-    clip: [[f32; 4]; 2],
-    focal: [f32; 2],
+    pub(super) clip: [[f32; 4]; 2],
+    pub(super) focal: [f32; 2],
     /// Limits of x/z and y/z in the Jacobian.
-    limit: [f32; 2],
-    size: [f32; 2],
+    pub(super) limit: [f32; 2],
+    pub(super) size: [f32; 2],
     /// Tiles across and down.
     pub(super) tiles: [usize; 2],
     /// Camera centre, world.
     pub(super) position: [f32; 3],
-    antialiased: bool,
+    pub(super) antialiased: bool,
 }
 
 impl View {
@@ -147,7 +147,8 @@ pub(super) fn project<L: Lanes>(
     let number = |value: f32| opacity.constant(value);
     let z = affine(view.rows[2], mean);
     let inverse_z = number(1.0) / z;
-    let axes = [screen_axis(view, 0, mean, factor, inverse_z), screen_axis(view, 1, mean, factor, inverse_z)];
+    let axis = |k: usize| screen_axis(view, k, mean, factor, inverse_z).factor;
+    let axes = [axis(0), axis(1)];
     let (bare_xx, xy, bare_yy) = (dot(axes[0], axes[0]), dot(axes[0], axes[1]), dot(axes[1], axes[1]));
     let (xx, yy) = (bare_xx + number(LOW_PASS), bare_yy + number(LOW_PASS));
     let determinant = xx * yy - xy * xy;
@@ -201,22 +202,34 @@ pub(super) fn project<L: Lanes>(
     }
 }
 
-/// Row k of J W M. The rows' Gram matrix is the screen covariance.
+/// Screen axis k of the linearised projection.
+#[derive(Clone, Copy)]
+pub(super) struct ScreenAxis<L: Lanes> {
+    /// x/z or y/z, and the same within the Jacobian's limit.
+    pub(super) slope: Wide<L>,
+    pub(super) limited: Wide<L>,
+    /// Row k of J W.
+    pub(super) row: [Wide<L>; 3],
+    /// Row k of J W M. The rows' Gram matrix is the screen covariance.
+    pub(super) factor: [Wide<L>; 3],
+}
+
 #[inline(always)]
-fn screen_axis<L: Lanes>(
+pub(super) fn screen_axis<L: Lanes>(
     view: &View,
     k: usize,
     mean: [Wide<L>; 3],
     factor: [[Wide<L>; 3]; 3],
     inverse_z: Wide<L>,
-) -> [Wide<L>; 3] {
+) -> ScreenAxis<L> {
     let number = |value: f32| inverse_z.constant(value);
     let limit = number(view.limit[k]);
-    let slope = (affine(view.rows[k], mean) * inverse_z).max(-limit).min(limit);
+    let slope = affine(view.rows[k], mean) * inverse_z;
+    let limited = slope.max(-limit).min(limit);
     let scale = number(view.focal[k]) * inverse_z;
     let row =
-        each([0, 1, 2], |i| slope.neg_mul_add(number(view.rows[2][i]), number(view.rows[k][i])) * scale);
-    [dot(row, factor[0]), dot(row, factor[1]), dot(row, factor[2])]
+        each([0, 1, 2], |i| limited.neg_mul_add(number(view.rows[2][i]), number(view.rows[k][i])) * scale);
+    ScreenAxis { slope, limited, row, factor: each(factor, |column| dot(row, column)) }
 }
 
 /// Pixel coordinate k. The original computes `((ndc + 1) size - 1) / 2` in f64 and rounds: the same bits as one fused
@@ -250,13 +263,13 @@ fn tile_range<L: Lanes>(
 
 /// `row · (p, 1)`.
 #[inline(always)]
-fn affine<L: Lanes>(row: [f32; 4], p: [Wide<L>; 3]) -> Wide<L> {
+pub(super) fn affine<L: Lanes>(row: [f32; 4], p: [Wide<L>; 3]) -> Wide<L> {
     let number = |value: f32| p[0].constant(value);
     let sum = p[0].mul_add(number(row[0]), number(row[3]));
     p[2].mul_add(number(row[2]), p[1].mul_add(number(row[1]), sum))
 }
 
 #[inline(always)]
-fn dot<L: Lanes>(a: [Wide<L>; 3], b: [Wide<L>; 3]) -> Wide<L> {
+pub(super) fn dot<L: Lanes>(a: [Wide<L>; 3], b: [Wide<L>; 3]) -> Wide<L> {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }

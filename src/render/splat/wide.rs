@@ -26,6 +26,13 @@ impl<L: Lanes> Wide<L> {
         self.lanes.store(self.values)
     }
 
+    /// Lane j of row i becomes lane i of row j.
+    #[inline(always)]
+    pub(super) fn transpose(rows: &[Self; 16]) -> [Self; 16] {
+        let columns = rows[0].lanes.transpose(&each(*rows, |row| row.values));
+        each(columns, |values| rows[0].with(values))
+    }
+
     #[inline(always)]
     fn with(self, values: L::F) -> Self {
         Self { values, ..self }
