@@ -25,6 +25,7 @@ mod colour;
 mod covariance;
 mod error;
 pub mod face_frame;
+mod frame;
 mod joints;
 mod layout;
 pub mod nearest;
@@ -32,6 +33,7 @@ mod pose;
 mod presets;
 mod rest_faces;
 mod rotate;
+mod seat;
 mod spec;
 mod surfel;
 
@@ -41,5 +43,5 @@ pub use choices::{
     ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
 };
 pub use error::StrategyError;
-pub use pose::pose;
+pub use pose::{PoseBuffers, pose, pose_into};
 pub use presets::{PRESETS, Preset};

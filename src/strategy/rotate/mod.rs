@@ -47,7 +47,7 @@ impl<'a> Source<'a> {
         choice: RotationChoice,
         joints: &Joints,
         body: &crate::scene::PosedBody<'_>,
-        surface: Option<&'a super::bound::Surface>,
+        surface: Option<&'a super::seat::Surface>,
     ) -> Self {
         match (choice, surface) {
             (RotationChoice::Lbs(projection), _) => Self::Lbs(projection),
@@ -90,7 +90,7 @@ impl BlockInput<'_> {
     }
 
     /// Index of a lane's Gaussian.
-    fn gaussian(&self, lane: usize) -> usize {
+    pub(super) fn gaussian(&self, lane: usize) -> usize {
         self.start + usize::from(self.block.index[lane])
     }
 }
