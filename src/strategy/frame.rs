@@ -19,7 +19,7 @@ pub(super) struct Frame<'a> {
     pub(super) body: &'a PosedBody<'a>,
     pub(super) strategy: &'a Strategy,
     joints: Joints,
-    source: Source<'a>,
+    pub(super) source: Source<'a>,
     arch: pulp::Arch,
 }
 

@@ -17,6 +17,7 @@
 //!
 //! [`Posed`]: crate::scene::Posed
 
+mod adjoint;
 mod bake;
 mod blend;
 mod bound;
@@ -37,6 +38,7 @@ mod seat;
 mod spec;
 mod surfel;
 
+pub use adjoint::pose_backward;
 pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;
 pub use choices::{
