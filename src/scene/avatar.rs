@@ -39,16 +39,26 @@ impl Gaussians {
 
     /// Unit quaternions (w, x, y, z), normalised in f64.
     pub fn unit_rotations(&self) -> Vec<[f32; 4]> {
-        let unit = |q: &[f32; 4]| {
-            let norm = q.iter().map(|&c| f64::from(c) * f64::from(c)).sum::<f64>().sqrt();
-            q.map(|c| (f64::from(c) / norm) as f32)
-        };
-        self.rotations.iter().map(unit).collect()
+        (0..self.rotations.len()).map(|i| self.unit_rotation(i)).collect()
+    }
+
+    /// The unit quaternion of Gaussian `i`.
+    #[inline]
+    pub fn unit_rotation(&self, i: usize) -> [f32; 4] {
+        let q = self.rotations[i].map(f64::from);
+        let norm = (((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3]).sqrt();
+        q.map(|c| (c / norm) as f32)
     }
 
     /// Opacities after the sigmoid.
     pub fn opacities(&self) -> Vec<f32> {
-        self.opacity_logits.iter().map(|&logit| 1.0 / (1.0 + (-logit).exp())).collect()
+        (0..self.opacity_logits.len()).map(|i| self.opacity(i)).collect()
+    }
+
+    /// The opacity of Gaussian `i`.
+    #[inline]
+    pub fn opacity(&self, i: usize) -> f32 {
+        1.0 / (1.0 + (-self.opacity_logits[i]).exp())
     }
 
     /// Checks that all arrays have the same length, that every value is finite, that no quaternion is zero and that

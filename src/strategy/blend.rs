@@ -62,6 +62,19 @@ impl Blend {
         moved
     }
 
+    /// Bᵀ g.
+    #[inline(always)]
+    pub(super) fn transform_adjoint(&self, g: &[Lanes; 3]) -> [Lanes; 3] {
+        let mut back = [[0.0; LANES]; 3];
+        for column in 0..3 {
+            let (a, b, c) = (&self.linear[column], &self.linear[3 + column], &self.linear[6 + column]);
+            for lane in 0..LANES {
+                back[column][lane] = a[lane] * g[0][lane] + b[lane] * g[1][lane] + c[lane] * g[2][lane];
+            }
+        }
+        back
+    }
+
     /// B of one lane.
     #[inline(always)]
     pub(super) fn matrix(&self, lane: usize) -> Matrix3<f32> {

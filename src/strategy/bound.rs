@@ -1,57 +1,13 @@
 //! An avatar bound to a body: everything that does not depend on the pose, computed once.
 
-use super::layout::{self, Canonical, Chunk};
-use super::nearest::NearestFace;
-use super::rest_faces::RestFaces;
+use super::layout::{self, CHUNK, Chunk};
+use super::seat::{self, Seat, Surface};
 use super::{CovarianceChoice, StrategyError, surfel};
-use crate::scene::{Avatar, Binding, FaceBinding, RestBody, SkinWeights};
+use crate::math::sh;
+use crate::scene::{Avatar, Binding, Gaussians, RestBody, SceneError, SkinWeights};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::OnceLock;
-
-/// Where a Gaussian sits on the mesh.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Seat {
-    /// Face index.
-    pub(crate) face: u32,
-    /// Its vertices.
-    pub(crate) corners: [u32; 3],
-    /// As given for face-bound Gaussians, of the nearest point for others. May leave \[0, 1\].
-    pub(crate) barycentric: [f32; 3],
-    /// Metres along the interpolated vertex normal; 0 for Gaussians with weights of their own.
-    pub(crate) offset: f32,
-}
-
-impl Seat {
-    /// The point on a mesh: `Σ b v + unit(Σ b n) offset`.
-    #[inline]
-    pub(crate) fn point(&self, vertices: &[Vec3], normals: &[Vec3]) -> Vec3 {
-        let [i, j, k] = [self.corners[0] as usize, self.corners[1] as usize, self.corners[2] as usize];
-        let [a, b, c] = self.barycentric;
-        let normal = normals[i] * a + normals[j] * b + normals[k] * c;
-        vertices[i] * a + vertices[j] * b + vertices[k] * c + normal.normalize_or_zero() * self.offset
-    }
-
-    /// The barycentric coordinates as weights: cut at zero, summing to one.
-    pub(crate) fn weights(&self) -> [f32; 3] {
-        let cut = self.barycentric.map(|b| b.max(0.0));
-        let sum: f32 = cut.iter().sum();
-        cut.map(|b| b / sum)
-    }
-}
-
-/// What Gaussians know of the mesh.
-#[derive(Clone, Debug)]
-pub(crate) struct Surface {
-    /// All faces of the body.
-    pub(crate) faces: RestFaces,
-    /// One per Gaussian.
-    pub(crate) seats: Vec<Seat>,
-    /// Per face: a Gaussian sits on it.
-    pub(crate) face_used: Vec<bool>,
-    /// Per vertex: it is a corner of such a face.
-    pub(crate) vertex_used: Vec<bool>,
-}
 
 /// A canonical avatar and how it hangs on a body.
 ///
@@ -98,6 +54,26 @@ impl BodyShape {
     }
 }
 
+impl Moves {
+    fn of(binding: &Binding) -> Self {
+        match binding {
+            Binding::Static => Self::Not,
+            Binding::Vertex(_) => Self::ByWeights,
+            Binding::Face(_) => Self::WithFaces,
+        }
+    }
+}
+
+impl std::fmt::Display for Moves {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Not => "a static avatar",
+            Self::ByWeights => "skinning weights per Gaussian",
+            Self::WithFaces => "a face per Gaussian",
+        })
+    }
+}
+
 impl std::fmt::Display for BodyShape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} joints, {} vertices, {} faces", self.joints, self.vertices, self.faces)
@@ -115,36 +91,95 @@ impl BoundAvatar {
         let gaussians = &avatar.gaussians;
         let (seats, mixed, moves) = match &avatar.binding {
             Binding::Static => (None, None, Moves::Not),
-            Binding::Vertex(_) => (nearest_seats(&gaussians.means, body), None, Moves::ByWeights),
+            Binding::Vertex(_) => (seat::nearest(&gaussians.means, body), None, Moves::ByWeights),
             Binding::Face(binding) => {
-                let seats = given_seats(binding, body);
+                let seats = seat::given(binding, body);
                 let mixed = mixed_weights(&seats, body)?;
                 (Some(seats), Some(mixed), Moves::WithFaces)
             }
-        };
-        let surface = seats.map(|seats| Surface::new(seats, body));
-        let means = match (moves, &surface) {
-            (Moves::WithFaces, Some(surface)) => rest_means(surface, body),
-            _ => gaussians.means.clone(),
         };
         let weights = match &avatar.binding {
             Binding::Vertex(weights) => Some(weights),
             Binding::Static | Binding::Face(_) => mixed.as_ref(),
         };
-        let scales: Vec<Vec3> = gaussians.log_scales.iter().map(|s| s.map(f32::exp)).collect();
-        let rotations = gaussians.unit_rotations();
-        let canonical = Canonical { means: &means, rotations: &rotations, scales: &scales };
-        Ok(Self {
-            chunks: layout::chunks(&canonical, weights),
+        let n = gaussians.len();
+        let mut bound = Self {
+            chunks: layout::chunks(n, weights),
             discs: OnceLock::new(),
-            means,
-            surface,
+            means: vec![Vec3::ZERO; n],
+            surface: seats.map(|seats| Surface::new(seats, body)),
             moves,
-            opacities: gaussians.opacities(),
-            sh_degree: gaussians.sh_degree,
-            sh: gaussians.sh.clone(),
+            opacities: vec![0.0; n],
+            sh_degree: 0,
+            sh: Vec::new(),
             shape: BodyShape::of(body),
-        })
+        };
+        bound.refresh(gaussians);
+        Ok(bound)
+    }
+
+    /// Takes over what an optimiser changed in the avatar: means, rotations, scales, opacities, SH (of any degree), and
+    /// the barycentric coordinates and offsets of face-bound Gaussians. In place, in parallel, without laying anything
+    /// out anew.
+    ///
+    /// What [`BoundAvatar::new`] derived from the binding stays as it was then: skinning weights (those of the avatar are
+    /// not read again, those of face-bound Gaussians stay mixed with the coordinates of that time) and the nearest face
+    /// of each Gaussian with weights of its own, with its nearest point. Where these are the same, the result poses to
+    /// the same bits as a freshly bound avatar. Values are not checked: an optimiser that makes NaNs must look for them.
+    ///
+    /// # Errors
+    /// [`StrategyError::Scene`] if the kind of binding, a count or the face of a Gaussian is not that of the avatar that
+    /// was bound, which must then be bound anew. Nothing has changed then.
+    pub fn update(&mut self, avatar: &Avatar) -> Result<(), StrategyError> {
+        let moves = Moves::of(&avatar.binding);
+        if moves != self.moves {
+            let (found, expected) = (moves.to_string(), format!("{} as at binding", self.moves));
+            return Err(SceneError::new("binding", found, expected).into());
+        }
+        self.check_counts(&avatar.gaussians)?;
+        if let (Binding::Face(binding), Some(surface)) = (&avatar.binding, &mut self.surface) {
+            surface.reseat(binding)?;
+        }
+        self.refresh(&avatar.gaussians);
+        Ok(())
+    }
+
+    /// All arrays have an entry for each of the bound Gaussians.
+    pub(crate) fn check_counts(&self, gaussians: &Gaussians) -> Result<(), SceneError> {
+        if gaussians.sh_degree > sh::MAX_DEGREE {
+            return Err(SceneError::new("f_rest", format!("degree {}", gaussians.sh_degree), "0 to 3"));
+        }
+        let n = self.len();
+        expect_count("x, y, z", gaussians.means.len(), n)?;
+        expect_count("rot", gaussians.rotations.len(), n)?;
+        expect_count("scale", gaussians.log_scales.len(), n)?;
+        expect_count("opacity", gaussians.opacity_logits.len(), n)?;
+        expect_count("f_dc/f_rest", gaussians.sh.len(), n * gaussians.sh_count())
+    }
+
+    /// Reads the parameters of all Gaussians; counts must fit.
+    fn refresh(&mut self, gaussians: &Gaussians) {
+        let rest = self.surface.as_ref().filter(|_| self.moves == Moves::WithFaces);
+        let places = self.means.par_chunks_mut(CHUNK).zip(self.opacities.par_chunks_mut(CHUNK));
+        let chunks = self.chunks.par_iter_mut().zip(places).enumerate();
+        chunks.for_each(|(c, (chunk, (means, opacities)))| {
+            let start = c * CHUNK;
+            match rest {
+                Some(surface) => surface.rest_means(start, means),
+                None => means.copy_from_slice(&gaussians.means[start..start + means.len()]),
+            }
+            for (i, opacity) in opacities.iter_mut().enumerate() {
+                *opacity = gaussians.opacity(start + i);
+            }
+            chunk.fill(means, gaussians, start);
+        });
+        self.sh_degree = gaussians.sh_degree;
+        self.sh.resize(gaussians.sh.len(), [0.0; 3]);
+        let coefficients = self.sh.par_chunks_mut(CHUNK).zip(gaussians.sh.par_chunks(CHUNK));
+        coefficients.for_each(|(own, given)| own.copy_from_slice(given));
+        if let (Some(discs), Some(surface)) = (self.discs.get_mut(), &self.surface) {
+            surfel::refresh(discs, &self.chunks, surface);
+        }
     }
 
     /// Number of Gaussians.
@@ -179,36 +214,10 @@ impl BoundAvatar {
     }
 }
 
-impl Surface {
-    fn new(seats: Vec<Seat>, body: &RestBody) -> Self {
-        let faces = RestFaces::new(body);
-        let mut face_used = vec![false; body.faces.len()];
-        let mut vertex_used = vec![false; body.vertices.len()];
-        for seat in &seats {
-            face_used[seat.face as usize] = true;
-            seat.corners.iter().for_each(|&v| vertex_used[v as usize] = true);
-        }
-        Self { faces, seats, face_used, vertex_used }
-    }
-}
-
-fn nearest_seats(means: &[Vec3], body: &RestBody) -> Option<Vec<Seat>> {
-    let tree = NearestFace::new(body)?;
-    let seat = |mean: &Vec3| {
-        let point = tree.nearest(mean.as_dvec3());
-        let barycentric = point.barycentric.map(|b| b as f32);
-        Seat { face: point.face, corners: body.faces[point.face as usize], barycentric, offset: 0.0 }
-    };
-    Some(means.par_iter().map(seat).collect())
-}
-
-fn given_seats(binding: &FaceBinding, body: &RestBody) -> Vec<Seat> {
-    let places = binding.faces.iter().zip(&binding.barycentric).zip(&binding.offsets);
-    let seat = |((&face, &barycentric), &offset)| {
-        let corners = body.faces[face as usize];
-        Seat { face, corners, barycentric, offset }
-    };
-    places.map(seat).collect()
+/// That an array has as many values as it must.
+pub(crate) fn expect_count(field: &str, found: usize, expected: usize) -> Result<(), SceneError> {
+    let problem = || SceneError::new(field, format!("{found} values"), format!("{expected}"));
+    if found == expected { Ok(()) } else { Err(problem()) }
 }
 
 fn mixed_weights(seats: &[Seat], body: &RestBody) -> Result<SkinWeights, StrategyError> {
@@ -218,11 +227,4 @@ fn mixed_weights(seats: &[Seat], body: &RestBody) -> Result<SkinWeights, Strateg
     };
     let rows: Vec<_> = seats.par_iter().map(row).collect();
     Ok(SkinWeights::from_rows(rows, body.skeleton.num_joints())?)
-}
-
-fn rest_means(surface: &Surface, body: &RestBody) -> Vec<Vec3> {
-    let vertices: Vec<Vec3> = body.vertices.iter().map(|v| v.as_vec3()).collect();
-    let normals = crate::scene::body::vertex_normals(&body.vertices, &body.faces);
-    let normals: Vec<Vec3> = normals.iter().map(|n| n.as_vec3()).collect();
-    surface.seats.iter().map(|seat| seat.point(&vertices, &normals)).collect()
 }

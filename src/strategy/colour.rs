@@ -54,3 +54,38 @@ pub(super) fn rotate_sh(turn: Quaternion<f32>, degree: usize, input: &[[f32; 3]]
     output.copy_from_slice(input);
     sh::Rotation::from_unit_quaternion(turn, degree).apply(output);
 }
+
+/// Adds to the derivative with respect to the SH of one Gaussian: Dᵀ is the D of the inverse.
+#[inline]
+pub(super) fn rotate_sh_adjoint(
+    turn: Quaternion<f32>,
+    degree: usize,
+    upstream: &[[f32; 3]],
+    gradient: &mut [[f32; 3]],
+) {
+    let mut back = [[0.0; 3]; sh::count(sh::MAX_DEGREE)];
+    let back = &mut back[..upstream.len()];
+    rotate_sh(rotation::conjugate(turn), degree, upstream, back);
+    add_sh(back, gradient);
+}
+
+/// Adds to the derivative with respect to SH that stay.
+#[inline]
+pub(super) fn add_sh(upstream: &[[f32; 3]], gradient: &mut [[f32; 3]]) {
+    for (sum, own) in gradient.as_flattened_mut().iter_mut().zip(upstream.as_flattened()) {
+        *sum += own;
+    }
+}
+
+/// The derivative with respect to a further rotation of SH that R has turned.
+pub(super) fn sh_torque(
+    turn: Quaternion<f32>,
+    degree: usize,
+    input: &[[f32; 3]],
+    upstream: &[[f32; 3]],
+) -> [f32; 3] {
+    let mut turned = [[0.0; 3]; sh::count(sh::MAX_DEGREE)];
+    let turned = &mut turned[..input.len()];
+    rotate_sh(turn, degree, input, turned);
+    sh::torque(degree, turned, upstream)
+}

@@ -5,7 +5,7 @@
 //! chunks are the unit of parallel work, and their borders depend on nothing but the index. The result is therefore the
 //! same, bit for bit, for any number of threads.
 
-use crate::scene::SkinWeights;
+use crate::scene::{Gaussians, SkinWeights};
 use rayon::prelude::*;
 
 /// Gaussians per block.
@@ -52,26 +52,14 @@ impl Chunk {
     }
 }
 
-/// Per-Gaussian parameters that go into blocks.
-pub(crate) struct Canonical<'a> {
-    /// Means, metres.
-    pub(crate) means: &'a [glam::Vec3],
-    /// Unit quaternions.
-    pub(crate) rotations: &'a [[f32; 4]],
-    /// Standard deviations, metres.
-    pub(crate) scales: &'a [glam::Vec3],
+/// Lays `n` Gaussians out, their parameters still zero. `weights` has a row per Gaussian; `None` is for Gaussians that do
+/// not move.
+pub(crate) fn chunks(n: usize, weights: Option<&SkinWeights>) -> Vec<Chunk> {
+    let range = |c: usize| c * CHUNK..((c + 1) * CHUNK).min(n);
+    (0..n.div_ceil(CHUNK)).into_par_iter().map(|c| chunk(weights, range(c))).collect()
 }
 
-/// Lays Gaussians out. `weights` has a row per Gaussian; `None` is for Gaussians that do not move.
-pub(crate) fn chunks(canonical: &Canonical<'_>, weights: Option<&SkinWeights>) -> Vec<Chunk> {
-    let n = canonical.means.len();
-    (0..n.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|c| chunk(canonical, weights, c * CHUNK..((c + 1) * CHUNK).min(n)))
-        .collect()
-}
-
-fn chunk(canonical: &Canonical<'_>, weights: Option<&SkinWeights>, range: std::ops::Range<usize>) -> Chunk {
+fn chunk(weights: Option<&SkinWeights>, range: std::ops::Range<usize>) -> Chunk {
     let start = range.start;
     let mut rows: Vec<(Vec<(u16, f32)>, usize)> = range.map(|i| (sorted_row(weights, i), i)).collect();
     let joints = |row: &[(u16, f32)]| row.iter().map(|&(joint, _)| joint).collect::<Vec<_>>();
@@ -79,7 +67,7 @@ fn chunk(canonical: &Canonical<'_>, weights: Option<&SkinWeights>, range: std::o
     let mut chunk = Chunk { blocks: Vec::new(), joints: Vec::new(), weights: Vec::new() };
     for group in rows.chunk_by(|(a, _), (b, _)| joints(a) == joints(b)) {
         for members in group.chunks(LANES) {
-            chunk.push(canonical, members, start);
+            chunk.push(members, start);
         }
     }
     chunk
@@ -100,26 +88,39 @@ fn sorted_row(weights: Option<&SkinWeights>, i: usize) -> Vec<(u16, f32)> {
 }
 
 impl Chunk {
-    fn push(&mut self, canonical: &Canonical<'_>, members: &[(Vec<(u16, f32)>, usize)], start: usize) {
+    fn push(&mut self, members: &[(Vec<(u16, f32)>, usize)], start: usize) {
         let member = |lane: usize| &members[lane.min(members.len() - 1)];
-        let gaussian = |lane: usize| member(lane).1;
         let first = self.joints.len();
         for (k, &(joint, _)) in member(0).0.iter().enumerate() {
             self.joints.push(joint);
             self.weights.push(std::array::from_fn(|lane| member(lane).0[k].1));
         }
-        let axes = |values: &[glam::Vec3]| {
-            std::array::from_fn(|axis| std::array::from_fn(|lane| values[gaussian(lane)][axis]))
-        };
         self.blocks.push(Block {
-            index: std::array::from_fn(|lane| (gaussian(lane) - start) as u16),
+            index: std::array::from_fn(|lane| (member(lane).1 - start) as u16),
             count: members.len(),
             influences: first..self.joints.len(),
-            means: axes(canonical.means),
-            rotations: std::array::from_fn(|k| {
-                std::array::from_fn(|lane| canonical.rotations[gaussian(lane)][k])
-            }),
-            scales: axes(canonical.scales),
+            means: [[0.0; LANES]; 3],
+            rotations: [[0.0; LANES]; 4],
+            scales: [[0.0; LANES]; 3],
         });
+    }
+
+    /// Sets the parameters of all blocks: means as given (those of this chunk), the rest as `gaussians` has it from index
+    /// `start` on.
+    pub(crate) fn fill(&mut self, means: &[glam::Vec3], gaussians: &Gaussians, start: usize) {
+        for block in &mut self.blocks {
+            for lane in 0..LANES {
+                let i = usize::from(block.index[lane]);
+                let rotation = gaussians.unit_rotation(start + i);
+                for k in 0..4 {
+                    block.rotations[k][lane] = rotation[k];
+                }
+                let log_scale = gaussians.log_scales[start + i];
+                for axis in 0..3 {
+                    block.means[axis][lane] = means[i][axis];
+                    block.scales[axis][lane] = log_scale[axis].exp();
+                }
+            }
+        }
     }
 }

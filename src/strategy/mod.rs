@@ -17,6 +17,7 @@
 //!
 //! [`Posed`]: crate::scene::Posed
 
+mod adjoint;
 mod bake;
 mod blend;
 mod bound;
@@ -25,6 +26,7 @@ mod colour;
 mod covariance;
 mod error;
 pub mod face_frame;
+mod frame;
 mod joints;
 mod layout;
 pub mod nearest;
@@ -32,14 +34,16 @@ mod pose;
 mod presets;
 mod rest_faces;
 mod rotate;
+mod seat;
 mod spec;
 mod surfel;
 
+pub use adjoint::pose_backward;
 pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;
 pub use choices::{
     ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
 };
 pub use error::StrategyError;
-pub use pose::pose;
+pub use pose::{PoseBuffers, pose, pose_into};
 pub use presets::{PRESETS, Preset};

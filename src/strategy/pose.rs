@@ -1,18 +1,17 @@
 //! Canonical avatar and posed body to [`Posed`], a chunk of Gaussians at a time.
 
-use super::blend::Blend;
-use super::bound::{BodyShape, Moves};
+use super::bound::Moves;
 use super::covariance::factors;
-use super::joints::Joints;
-use super::layout::{Block, CHUNK, Chunk, LANES, Lanes};
-use super::rotate::{BlockInput, Source, Turn, take, turn};
+use super::frame::{Frame, Visitor};
+use super::layout::{CHUNK, Lanes};
+use super::rotate::{BlockInput, Turn, take};
 use super::{
-    BoundAvatar, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
-    StrategyError, colour, face_frame,
+    BoundAvatar, ColourChoice, CovarianceChoice, LbsProjection, RotationChoice, Strategy, StrategyError,
+    colour,
 };
 use crate::math::Quaternion;
 use crate::scene::{Posed, PosedBody};
-use glam::{Mat3, Quat, Vec3};
+use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -31,39 +30,72 @@ pub fn pose<'a>(
     body: &PosedBody<'_>,
     strategy: &Strategy,
 ) -> Result<Posed<'a>, StrategyError> {
-    pose_on(pulp::Arch::new(), bound, body, strategy)
+    pose_on(pulp::Arch::new(), bound, body, strategy, &mut PoseBuffers::default())
 }
 
-/// [`pose`] with the instructions of one kind of processor.
+/// [`pose`] into memory that a pose of before has left: at 100,000 Gaussians fresh memory costs as much as the work.
+///
+/// # Errors
+/// As [`pose`]; the buffers are kept.
+pub fn pose_into<'a>(
+    bound: &'a BoundAvatar,
+    body: &PosedBody<'_>,
+    strategy: &Strategy,
+    buffers: &mut PoseBuffers,
+) -> Result<Posed<'a>, StrategyError> {
+    pose_on(pulp::Arch::new(), bound, body, strategy, buffers)
+}
+
+/// Memory of poses that are no longer needed: [`pose_into`] takes it, [`PoseBuffers::reclaim`] gives it back.
+#[derive(Debug, Default)]
+pub struct PoseBuffers {
+    means: Vec<Vec3>,
+    factors: Vec<Mat3>,
+    rotations: Vec<Quaternion<f32>>,
+    view_frames: Vec<Mat3>,
+    sh: Vec<[f32; 3]>,
+}
+
+impl PoseBuffers {
+    /// Takes the memory of a pose. What it does not have (a strategy does not produce everything) is kept.
+    pub fn reclaim(&mut self, posed: Posed<'_>) {
+        self.means = posed.means;
+        self.factors = posed.factors;
+        if let Some(rotations) = posed.rotations {
+            self.rotations = rotations;
+        }
+        if let Some(view_frames) = posed.view_frames {
+            self.view_frames = view_frames;
+        }
+        if let Cow::Owned(sh) = posed.sh {
+            self.sh = sh;
+        }
+    }
+}
+
+/// The memory, with `n` entries of any value.
+fn sized<T: Clone>(memory: &mut Vec<T>, n: usize, zero: T) -> Vec<T> {
+    let mut memory = std::mem::take(memory);
+    memory.resize(n, zero);
+    memory
+}
+
+/// [`pose_into`] with the instructions of one kind of processor.
 fn pose_on<'a>(
     arch: pulp::Arch,
     bound: &'a BoundAvatar,
     body: &PosedBody<'_>,
     strategy: &Strategy,
+    buffers: &mut PoseBuffers,
 ) -> Result<Posed<'a>, StrategyError> {
-    let shape = BodyShape::of(body.rest);
-    if shape != bound.shape {
-        let (found, expected) = (shape.to_string(), bound.shape.to_string());
-        return Err(StrategyError::OtherBody { found, expected });
-    }
-    let needs_faces = strategy.rotation.needs_faces() || strategy.covariance == CovarianceChoice::Surfel;
-    if needs_faces && bound.surface.is_none() && bound.moves != Moves::Not {
-        return Err(StrategyError::NoFaces { strategy: strategy.to_string() });
-    }
-    let joints = Joints::new(body);
-    let source = if reads_rotation(strategy) {
-        Source::new(strategy.rotation, &joints, body, bound.surface.as_ref())
-    } else {
-        Source::Identity
-    };
-    let frame = Frame { bound, body, strategy, joints, source, arch };
+    let frame = Frame::new(arch, bound, body, strategy)?;
     let produces = Produces::of(strategy, bound);
     let n = bound.len();
-    let mut means = vec![Vec3::ZERO; n];
-    let mut factors = vec![Mat3::ZERO; n];
-    let mut rotations = produces.rotations.then(|| vec![[0.0; 4]; n]);
-    let mut view_frames = produces.view_frames.then(|| vec![Mat3::ZERO; n]);
-    let mut sh = produces.sh.then(|| vec![[0.0; 3]; bound.sh.len()]);
+    let mut means = sized(&mut buffers.means, n, Vec3::ZERO);
+    let mut factors = sized(&mut buffers.factors, n, Mat3::ZERO);
+    let mut rotations = produces.rotations.then(|| sized(&mut buffers.rotations, n, [0.0; 4]));
+    let mut view_frames = produces.view_frames.then(|| sized(&mut buffers.view_frames, n, Mat3::ZERO));
+    let mut sh = produces.sh.then(|| sized(&mut buffers.sh, bound.sh.len(), [0.0; 3]));
     let outputs = Outputs {
         means: &mut means,
         factors: &mut factors,
@@ -72,9 +104,8 @@ fn pose_on<'a>(
         sh: sh.as_deref_mut().unwrap_or_default(),
     };
     let parts = outputs.split(bound.sh_count());
-    let chunks = bound.chunks(strategy.covariance).par_iter().zip(parts).enumerate();
-    chunks.for_each(|(c, (chunk, outputs))| {
-        PoseChunk { frame: &frame, chunk, start: c * CHUNK, outputs }.run();
+    parts.into_par_iter().enumerate().for_each(|(c, outputs)| {
+        PoseChunk { frame: &frame, start: c * CHUNK, outputs, turns: Vec::new() }.run(c);
     });
     Ok(Posed {
         means,
@@ -86,23 +117,6 @@ fn pose_on<'a>(
         colour_clamp: strategy.clamp.into(),
         rotations,
     })
-}
-
-/// False if nothing depends on R: not the means, not the covariance, not the colour.
-fn reads_rotation(strategy: &Strategy) -> bool {
-    let for_covariance = match strategy.covariance {
-        CovarianceChoice::Rotate | CovarianceChoice::Surfel => true,
-        CovarianceChoice::Affine | CovarianceChoice::AffineConjugate => false,
-    };
-    let for_colour = match strategy.colour {
-        ColourChoice::RotateSh | ColourChoice::ViewRotation => true,
-        ColourChoice::None | ColourChoice::ViewBlend | ColourChoice::ViewBlendInverse => false,
-    };
-    let for_means = matches!(
-        strategy.rotation,
-        RotationChoice::DualQuaternion | RotationChoice::FaceFrame(FaceFrame::HahaScaled)
-    );
-    for_covariance || for_colour || for_means
 }
 
 /// Which of the optional outputs a strategy produces. Colours of degree 0 look the same from everywhere.
@@ -128,30 +142,6 @@ impl Produces {
         };
         let seen = bound.sh_degree > 0;
         Self { rotations, view_frames: view_frames && seen, sh: sh && seen }
-    }
-}
-
-/// What all chunks of a frame share.
-struct Frame<'a> {
-    bound: &'a BoundAvatar,
-    body: &'a PosedBody<'a>,
-    strategy: &'a Strategy,
-    joints: Joints,
-    source: Source<'a>,
-    arch: pulp::Arch,
-}
-
-impl Frame<'_> {
-    /// HAHA's k over its value at rest; 1 for static Gaussians and on faces without area in either pose.
-    fn growth(&self, gaussian: usize) -> f32 {
-        let Frame { bound, body, source, .. } = self;
-        let (Some(surface), Source::Faces(turns)) = (&bound.surface, source) else { return 1.0 };
-        if turns.of_gaussian(gaussian).is_none() {
-            return 1.0;
-        }
-        let seat = &surface.seats[gaussian];
-        let corners = seat.corners.map(|v| body.mesh().vertices[v as usize]);
-        face_frame::haha_size(&corners) / surface.faces.sizes[seat.face as usize]
     }
 }
 
@@ -184,127 +174,84 @@ impl<'o> Outputs<'o> {
 }
 
 /// The work on one chunk.
-struct PoseChunk<'a, 'o> {
-    frame: &'a Frame<'a>,
-    chunk: &'a Chunk,
+struct PoseChunk<'f, 'a, 'o> {
+    frame: &'f Frame<'a>,
     /// Index of the first Gaussian.
     start: usize,
     outputs: Outputs<'o>,
-}
-
-/// The part of it that is compiled for each instruction set.
-struct Blocks<'c, 'a, 'o> {
-    job: &'c mut PoseChunk<'a, 'o>,
     /// R of each Gaussian, for the SH; empty if they stay.
-    turns: &'c mut [Quaternion<f32>],
+    turns: Vec<Quaternion<f32>>,
 }
 
-impl pulp::WithSimd for Blocks<'_, '_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        for block in &self.job.chunk.blocks {
-            self.job.block(block, self.turns);
-        }
-    }
-}
-
-impl PoseChunk<'_, '_> {
+impl PoseChunk<'_, '_, '_> {
     /// Blocks are visited by joints; what streams through memory, SH and mesh, follows in the order of the Gaussians.
-    fn run(mut self) {
-        let frame = self.frame;
-        let rotates_sh = !self.outputs.sh.is_empty();
-        let mut turns = vec![[0.0; 4]; if rotates_sh { self.outputs.means.len() } else { 0 }];
-        frame.arch.dispatch(Blocks { job: &mut self, turns: &mut turns });
+    fn run(mut self, number: usize) {
+        let (frame, start) = (self.frame, self.start);
+        if !self.outputs.sh.is_empty() {
+            self.turns.resize(self.outputs.means.len(), [0.0; 4]);
+        }
+        let chunk = &frame.bound.chunks(frame.strategy.covariance)[number];
+        frame.walk(chunk, start, &mut self);
         self.means_on_mesh();
         let (degree, count) = (frame.bound.sh_degree, frame.bound.sh_count());
-        let input = frame.bound.sh[self.start * count..].chunks_exact(count);
-        for ((turn, input), output) in turns.iter().zip(input).zip(self.outputs.sh.chunks_exact_mut(count)) {
+        let input = frame.bound.sh[start * count..].chunks_exact(count);
+        for ((turn, input), output) in
+            self.turns.iter().zip(input).zip(self.outputs.sh.chunks_exact_mut(count))
+        {
             colour::rotate_sh(*turn, degree, input, output);
-        }
-    }
-
-    #[inline(always)]
-    fn block(&mut self, block: &Block, turns: &mut [Quaternion<f32>]) {
-        let Frame { bound, strategy, joints, source, arch, .. } = self.frame;
-        let (indices, weights) = self.chunk.influences(block);
-        let blend = Blend::new(joints, indices, weights);
-        let input = BlockInput { joints, chunk: self.chunk, block, start: self.start, blend: &blend };
-        let turn = turn(*arch, source, &input);
-        let mut scales = block.scales;
-        if strategy.rotation == RotationChoice::FaceFrame(FaceFrame::HahaScaled) {
-            self.scale_with_faces(block, &mut scales);
-        }
-        let factors = factors(strategy.covariance, &turn.posed, &blend, &block.rotations, &scales);
-        let means = match (bound.moves, &turn.means) {
-            (Moves::Not, _) | (Moves::WithFaces, _) => block.means,
-            (Moves::ByWeights, Some(means)) => *means,
-            (Moves::ByWeights, None) => blend.transform(&block.means),
-        };
-        self.store(block, &means, &factors, &turn, turns);
-        if !self.outputs.view_frames.is_empty() {
-            for lane in 0..block.count {
-                let frame = colour::view_frame(strategy.colour, &turn.relative, &input, lane);
-                self.outputs.view_frames[usize::from(block.index[lane])] = frame;
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn store(
-        &mut self,
-        block: &Block,
-        means: &[Lanes; 3],
-        factors: &[Lanes; 9],
-        turn: &Turn,
-        turns: &mut [Quaternion<f32>],
-    ) {
-        for lane in 0..block.count {
-            let i = usize::from(block.index[lane]);
-            self.outputs.means[i] = Vec3::new(means[0][lane], means[1][lane], means[2][lane]);
-            let column = |c: usize| Vec3::new(factors[c][lane], factors[3 + c][lane], factors[6 + c][lane]);
-            self.outputs.factors[i] = Mat3::from_cols(column(0), column(1), column(2));
-            if let Some(rotation) = self.outputs.rotations.get_mut(i) {
-                *rotation = take(&turn.posed, lane);
-            }
-            if let Some(relative) = turns.get_mut(i) {
-                *relative = take(&turn.relative, lane);
-            }
         }
     }
 
     /// Means that follow the mesh: those of face-bound Gaussians, and all under HAHA's scaled frames.
     fn means_on_mesh(&mut self) {
-        let Frame { bound, body, strategy, source, .. } = self.frame;
-        let scaled = strategy.rotation == RotationChoice::FaceFrame(FaceFrame::HahaScaled);
+        let Frame { bound, body, .. } = self.frame;
         let Some(surface) = &bound.surface else { return };
-        if bound.moves != Moves::WithFaces && !scaled {
+        let on_faces = bound.moves == Moves::WithFaces;
+        if !on_faces && !self.frame.scales_with_faces() {
             return;
         }
         let mesh = body.mesh();
         let seats = &surface.seats[self.start..];
-        if bound.moves == Moves::WithFaces {
-            for (mean, seat) in self.outputs.means.iter_mut().zip(seats) {
-                *mean = seat.point(&mesh.vertices, &mesh.normals);
-            }
-        }
-        let (true, Source::Faces(turns)) = (scaled, source) else { return };
         for (i, (mean, seat)) in self.outputs.means.iter_mut().zip(seats).enumerate() {
             let gaussian = self.start + i;
-            let Some([w, x, y, z]) = turns.of_gaussian(gaussian) else { continue };
-            let corners = seat.corners.map(|v| mesh.vertices[v as usize]);
-            let offset = bound.means[gaussian] - surface.faces.centroids[seat.face as usize];
-            let turned = Quat::from_xyzw(x, y, z, w) * offset;
-            *mean = face_frame::centroid(&corners) + turned * self.frame.growth(gaussian);
+            if let Some(motion) = self.frame.face_motion(gaussian) {
+                *mean = motion.apply(bound.means[gaussian]);
+            } else if on_faces {
+                *mean = seat.point(mesh);
+            }
         }
     }
+}
 
-    #[inline(never)]
-    fn scale_with_faces(&self, block: &Block, scales: &mut [Lanes; 3]) {
-        for lane in 0..LANES {
-            let growth = self.frame.growth(self.start + usize::from(block.index[lane]));
-            scales.iter_mut().for_each(|axis| axis[lane] *= growth);
+impl Visitor for PoseChunk<'_, '_, '_> {
+    #[inline(always)]
+    fn block(&mut self, _: usize, input: &BlockInput<'_>, turn: &Turn, scales: &[Lanes; 3]) {
+        let Frame { bound, strategy, .. } = self.frame;
+        let block = input.block;
+        let factors = factors(strategy.covariance, &turn.posed, input.blend, &block.rotations, scales);
+        let means = match (bound.moves, &turn.means) {
+            (Moves::Not | Moves::WithFaces, _) => block.means,
+            (Moves::ByWeights, Some(means)) => *means,
+            (Moves::ByWeights, None) => input.blend.transform(&block.means),
+        };
+        let outputs = &mut self.outputs;
+        for lane in 0..block.count {
+            let i = usize::from(block.index[lane]);
+            outputs.means[i] = Vec3::new(means[0][lane], means[1][lane], means[2][lane]);
+            let column = |c: usize| Vec3::new(factors[c][lane], factors[3 + c][lane], factors[6 + c][lane]);
+            outputs.factors[i] = Mat3::from_cols(column(0), column(1), column(2));
+            if let Some(rotation) = outputs.rotations.get_mut(i) {
+                *rotation = take(&turn.posed, lane);
+            }
+            if let Some(relative) = self.turns.get_mut(i) {
+                *relative = take(&turn.relative, lane);
+            }
+        }
+        if !outputs.view_frames.is_empty() {
+            for lane in 0..block.count {
+                let frame = colour::view_frame(strategy.colour, &turn.relative, input, lane);
+                outputs.view_frames[usize::from(block.index[lane])] = frame;
+            }
         }
     }
 }
@@ -352,7 +299,9 @@ mod tests {
         let at = Pose::from_axis_angles(&body.skeleton, &angles, DVec3::Z);
         let body = PosedBody::new(&body, &at).unwrap();
         for preset in PRESETS {
-            let narrow = pose_on(pulp::Arch::Scalar, &bound, &body, &preset.strategy).unwrap();
+            let narrow =
+                pose_on(pulp::Arch::Scalar, &bound, &body, &preset.strategy, &mut PoseBuffers::default())
+                    .unwrap();
             assert_eq!(narrow, pose(&bound, &body, &preset.strategy).unwrap(), "{}", preset.id);
         }
     }

@@ -2,12 +2,14 @@
 
 use super::FaceFrame;
 use super::face_frame::{self, Frame};
-use crate::scene::RestBody;
+use crate::scene::{PosedMesh, RestBody, body};
 use glam::Vec3;
 
-/// Rest frames, areas and sizes, one per face of a body.
+/// The rest mesh, and frames, areas and sizes, one per face of a body.
 #[derive(Clone, Debug)]
 pub(crate) struct RestFaces {
+    /// Vertices and vertex normals.
+    pub(crate) mesh: PosedMesh,
     /// Vertex indices.
     pub(crate) corners: Vec<[u32; 3]>,
     /// The frame along v0→v1 (SplattingAvatar's; iHuman's differs from it by a constant); `None` without area.
@@ -27,6 +29,7 @@ impl RestFaces {
     pub(crate) fn new(body: &RestBody) -> Self {
         let vertices: Vec<Vec3> = body.vertices.iter().map(|v| v.as_vec3()).collect();
         let triangles: Vec<[Vec3; 3]> = body.faces.iter().map(|f| f.map(|v| vertices[v as usize])).collect();
+        let normals = body::vertex_normals(&body.vertices, &body.faces);
         let frames = |kind| triangles.iter().map(|&t| face_frame::frame(kind, t)).collect();
         Self {
             corners: body.faces.clone(),
@@ -35,6 +38,7 @@ impl RestFaces {
             areas: triangles.iter().map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).collect(),
             centroids: triangles.iter().map(face_frame::centroid).collect(),
             sizes: triangles.iter().map(face_frame::haha_size).collect(),
+            mesh: PosedMesh { vertices, normals: normals.iter().map(|n| n.as_vec3()).collect() },
         }
     }
 

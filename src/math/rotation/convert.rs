@@ -37,7 +37,7 @@ impl SignPolicy {
 /// Row i is 4 q_i q for a rotation, and 4 A_i (+ W − 1 on the diagonal) for a blend of rotations of total weight W,
 /// where A = Σ w q qᵀ.
 #[inline(always)]
-fn four_outer_product<T: Real>(m: Matrix3<T>) -> [[T; 4]; 4] {
+pub(super) fn four_outer_product<T: Real>(m: Matrix3<T>) -> [[T; 4]; 4] {
     let (xx, yy, zz) = (m[0][0], m[1][1], m[2][2]);
     let (wx, wy, wz) = (m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]);
     let (xy, xz, yz) = (m[1][0] + m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1]);
@@ -56,6 +56,15 @@ fn four_outer_product<T: Real>(m: Matrix3<T>) -> [[T; 4]; 4] {
 /// On a blend B = Σ w R of rotations (Σ w = 1) this is A e_i / √A_ii with A = Σ w q qᵀ: one un-normalised power step.
 pub fn matrix_to_quaternion_raw<T: Real>(m: Matrix3<T>) -> Quaternion<T> {
     let outer = four_outer_product(m);
+    let (best, magnitude) = leading(&outer);
+    let divisor = T::from_f64(2.0) * magnitude.max(T::from_f64(0.1));
+    let mut candidate = outer[best];
+    candidate[best] = magnitude * magnitude;
+    candidate.map(|c| c / divisor)
+}
+
+/// The candidate with the largest component of its own (the first of equals), and twice that component.
+pub(super) fn leading<T: Real>(outer: &[[T; 4]; 4]) -> (usize, T) {
     let magnitudes = [outer[0][0], outer[1][1], outer[2][2], outer[3][3]].map(|s| s.max(T::ZERO).sqrt());
     let mut best = 0;
     for i in 1..4 {
@@ -63,10 +72,7 @@ pub fn matrix_to_quaternion_raw<T: Real>(m: Matrix3<T>) -> Quaternion<T> {
             best = i;
         }
     }
-    let divisor = T::from_f64(2.0) * magnitudes[best].max(T::from_f64(0.1));
-    let mut candidate = outer[best];
-    candidate[best] = magnitudes[best] * magnitudes[best];
-    candidate.map(|c| c / divisor)
+    (best, magnitudes[best])
 }
 
 /// The unit quaternion of a rotation matrix, w ≥ 0 ([`SignPolicy::NonNegativeW`]). Accurate for every angle. A matrix

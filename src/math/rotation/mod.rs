@@ -1,5 +1,6 @@
 //! Rotations of 3-space: quaternions, conversions, projections of a blended matrix onto the rotations.
 
+pub mod adjoint;
 mod convert;
 mod projection;
 

@@ -5,7 +5,7 @@
 
 mod rotation;
 
-pub use rotation::Rotation;
+pub use rotation::{Rotation, torque};
 
 use super::Real;
 

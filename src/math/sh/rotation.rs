@@ -102,6 +102,60 @@ impl<T: Real> Rotation<T> {
     }
 }
 
+/// The derivative of `⟨gradient, D(ω) coefficients⟩` with respect to a further rotation by ω (axis times angle), at
+/// ω = 0: how a loss changes when SH that are already rotated are turned on, about x, y and z. Degrees as in
+/// [`Rotation::apply`].
+///
+/// With L the derivative of D about an axis: L_z mixes m and −m, L_y = −J L_z J, and L_x = \[L_y, L_z\]; all are
+/// antisymmetric.
+pub fn torque<T: Real>(degree: usize, coefficients: &[[T; 3]], gradient: &[[T; 3]]) -> [T; 3] {
+    let mut sum = [T::ZERO; 3];
+    let mut add = |band: Option<[T; 3]>| {
+        for (sum, own) in sum.iter_mut().zip(band.unwrap_or_default()) {
+            *sum += own;
+        }
+    };
+    if degree >= 1 {
+        add(torque_of_band(coefficients, gradient, exchange_1::<T>));
+    }
+    if degree >= 2 {
+        add(torque_of_band(coefficients, gradient, exchange_2::<T>));
+    }
+    if degree >= 3 {
+        add(torque_of_band(coefficients, gradient, exchange_3::<T>));
+    }
+    sum
+}
+
+fn torque_of_band<T: Real, const N: usize>(
+    coefficients: &[[T; 3]],
+    gradient: &[[T; 3]],
+    exchange: impl Fn([T::Triple; N]) -> [T::Triple; N],
+) -> Option<[T; 3]> {
+    let offset = count((N - 1) / 2 - 1);
+    let band = |values: &[[T; 3]]| -> Option<[T::Triple; N]> {
+        let own: [[T; 3]; N] = values.get(offset..offset + N)?.try_into().ok()?;
+        Some(own.map(T::Triple::from))
+    };
+    let (c, u) = (band(coefficients)?, band(gradient)?);
+    let generators = |v| (exchange(spin_z::<T, N>(exchange(v))).map(|e| -e), spin_z::<T, N>(v));
+    let ((y_c, z_c), (y_u, z_u)) = (generators(c), generators(u));
+    let dot = |a: [T::Triple; N], b: [T::Triple; N]| {
+        let products = a.into_iter().zip(b).map(|(a, b)| super::super::matrix3::dot(a.into(), b.into()));
+        products.fold(T::ZERO, |sum, product| sum + product)
+    };
+    Some([dot(z_u, y_c) - dot(y_u, z_c), dot(u, y_c), dot(u, z_c)])
+}
+
+/// The derivative of [`about_z`] at the angle 0.
+fn spin_z<T: Real, const N: usize>(c: [T::Triple; N]) -> [T::Triple; N] {
+    let centre = N / 2;
+    std::array::from_fn(|i| {
+        let m = T::from_f64(i as f64 - centre as f64);
+        -(c[N - 1 - i] * m)
+    })
+}
+
 /// The coefficients of the band with N = 2 l + 1 members.
 #[inline(always)]
 fn band_mut<T, const N: usize>(coefficients: &mut [[T; 3]]) -> Option<&mut [[T; 3]; N]> {
@@ -173,4 +227,31 @@ fn exchange_3<T: Real>([a, b, c, d, e, f, g]: [T::Triple; 7]) -> [T::Triple; 7] 
         c * root10 - a * root6,
         g * quarter - e * root15,
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn torque_is_the_derivative_of_the_rotation() {
+        let wave = |k: usize, f: f64| [0, 1, 2].map(|c| ((k * 3 + c) as f64 * f + 1.0).sin());
+        let coefficients: Vec<[f64; 3]> = (0..16).map(|k| wave(k, 0.7)).collect();
+        let gradient: Vec<[f64; 3]> = (0..16).map(|k| wave(k, 1.9)).collect();
+        for degree in 0..=MAX_DEGREE {
+            let loss = |axis: usize, angle: f64| {
+                let mut q = [(angle / 2.0).cos(), 0.0, 0.0, 0.0];
+                q[1 + axis] = (angle / 2.0).sin();
+                let mut turned = coefficients.clone();
+                Rotation::from_quaternion(q, degree).apply(&mut turned);
+                turned.iter().flatten().zip(gradient.iter().flatten()).map(|(a, b)| a * b).sum::<f64>()
+            };
+            let h = 1e-5;
+            for (axis, found) in torque(degree, &coefficients, &gradient).into_iter().enumerate() {
+                let expected = (loss(axis, h) - loss(axis, -h)) / (2.0 * h);
+                assert!((found - expected).abs() < 1e-8, "degree {degree}, axis {axis}: {found} {expected}");
+            }
+        }
+        assert_eq!(torque(3, &coefficients[..9], &gradient), torque(2, &coefficients, &gradient));
+    }
 }

@@ -4,10 +4,10 @@
 //! face without area in either pose, a vertex all of whose faces are, a sum of quaternions that cancels.
 
 use super::super::FaceFrame;
-use super::super::bound::{Seat, Surface};
 use super::super::face_frame;
 use super::super::joints::Joints;
 use super::super::layout::{LANES, Lanes};
+use super::super::seat::{Seat, Surface};
 use super::average::{splat, with_bones};
 use super::{BlockInput, put};
 use crate::math::average::{Solver, average_rotation};

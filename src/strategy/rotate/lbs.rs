@@ -4,7 +4,7 @@ use super::super::LbsProjection;
 use super::super::layout::{LANES, Lanes};
 use super::average::splat;
 use super::{BlockInput, Turn, put, take};
-use crate::math::{Quaternion, matrix3, rotation};
+use crate::math::{Quaternion, dot4, matrix3, rotation};
 
 /// The projections that need B alone. A rigid joint alone is its own projection.
 ///
@@ -53,6 +53,49 @@ pub(super) fn converted(projection: LbsProjection, input: &BlockInput<'_>) -> Tu
         );
     }
     turn
+}
+
+/// [`converted`] walked backwards, through B R_c. See [`super::turn_adjoint`].
+#[inline(never)]
+pub(super) fn converted_adjoint(
+    projection: LbsProjection,
+    input: &BlockInput<'_>,
+    turn: &Turn,
+    posed: &[Lanes; 4],
+    torque: &[Lanes; 3],
+) -> [Lanes; 4] {
+    let mut result = [[0.0; LANES]; 4];
+    for lane in 0..LANES {
+        let (canonical, of_posed) = (take(&input.block.rotations, lane), take(posed, lane));
+        let b = input.blend.matrix(lane);
+        let turned = matrix3::multiply(b, rotation::quaternion_to_matrix_raw(canonical));
+        let raw = rotation::matrix_to_quaternion_raw(turned);
+        let Some(unit) = rotation::normalize(raw) else {
+            put(&mut result, lane, of_posed);
+            continue;
+        };
+        // R = unit ⊗ R_c⁻¹: turning R_c on turns R back, seen from where R starts.
+        let torque = [0, 1, 2].map(|axis: usize| torque[axis][lane]);
+        let relative = rotation::conjugate(take(&turn.relative, lane));
+        let back = matrix3::apply(rotation::quaternion_to_matrix_raw(relative), torque).map(|t| -t);
+        let mut of_unit = rotation::adjoint::from_torque(unit, torque);
+        if projection == LbsProjection::MatrixToQuaternion {
+            of_unit = sum(of_unit, of_posed);
+        }
+        let mut of_raw = rotation::adjoint::normalize(unit, 1.0 / dot4(unit, raw), of_unit);
+        if projection == LbsProjection::MatrixToQuaternionRaw {
+            of_raw = sum(of_raw, of_posed);
+        }
+        let of_turned = rotation::adjoint::matrix_to_quaternion_raw(turned, of_raw);
+        let of_own = matrix3::multiply(matrix3::transpose(b), of_turned);
+        let through_turned = rotation::adjoint::quaternion_to_matrix_raw(canonical, &of_own);
+        put(&mut result, lane, sum(through_turned, rotation::adjoint::from_torque(canonical, back)));
+    }
+    result
+}
+
+fn sum(a: Quaternion<f32>, b: Quaternion<f32>) -> Quaternion<f32> {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 
 /// The rotation nearest to B, computed in `f64`; where several are equally near, the quaternion average's choice.

@@ -47,7 +47,7 @@ impl<'a> Source<'a> {
         choice: RotationChoice,
         joints: &Joints,
         body: &crate::scene::PosedBody<'_>,
-        surface: Option<&'a super::bound::Surface>,
+        surface: Option<&'a super::seat::Surface>,
     ) -> Self {
         match (choice, surface) {
             (RotationChoice::Lbs(projection), _) => Self::Lbs(projection),
@@ -90,7 +90,7 @@ impl BlockInput<'_> {
     }
 
     /// Index of a lane's Gaussian.
-    fn gaussian(&self, lane: usize) -> usize {
+    pub(super) fn gaussian(&self, lane: usize) -> usize {
         self.start + usize::from(self.block.index[lane])
     }
 }
@@ -126,6 +126,47 @@ pub(super) fn turn(arch: pulp::Arch, source: &Source<'_>, input: &BlockInput<'_>
     Turn { relative, posed, means }
 }
 
+/// The derivatives with respect to the canonical quaternions (to first order on the unit sphere) from those with respect
+/// to [`Turn::posed`]. `torque`, with respect to a further rotation of [`Turn::relative`], is read only where R depends
+/// on R_c.
+#[inline(always)]
+pub(super) fn turn_adjoint(
+    source: &Source<'_>,
+    input: &BlockInput<'_>,
+    turn: &Turn,
+    posed: &[Lanes; 4],
+    torque: &[Lanes; 3],
+) -> [Lanes; 4] {
+    match source {
+        Source::Lbs(projection) if projection.converts() && !input.block.influences.is_empty() => {
+            lbs::converted_adjoint(*projection, input, turn, posed, torque)
+        }
+        _ => {
+            let mut canonical = [[0.0; LANES]; 4];
+            for lane in 0..LANES {
+                let back = rotation::conjugate(take(&turn.relative, lane));
+                put(&mut canonical, lane, rotation::multiply(back, take(posed, lane)));
+            }
+            canonical
+        }
+    }
+}
+
+/// The derivatives with respect to the canonical means where [`Turn::means`] takes the place of Eq. 6: Rᵀ g.
+#[inline(always)]
+pub(super) fn means_adjoint(turn: &Turn, gradient: &[Lanes; 3]) -> [Lanes; 3] {
+    let mut means = [[0.0; LANES]; 3];
+    for lane in 0..LANES {
+        let back = rotation::quaternion_to_matrix_raw(rotation::conjugate(take(&turn.relative, lane)));
+        for axis in 0..3 {
+            means[axis][lane] = back[axis][0] * gradient[0][lane]
+                + back[axis][1] * gradient[1][lane]
+                + back[axis][2] * gradient[2][lane];
+        }
+    }
+    means
+}
+
 /// a ⊗ b per lane.
 #[inline(always)]
 fn multiply(a: &[Lanes; 4], b: &[Lanes; 4]) -> [Lanes; 4] {
@@ -134,6 +175,15 @@ fn multiply(a: &[Lanes; 4], b: &[Lanes; 4]) -> [Lanes; 4] {
         put(&mut product, lane, rotation::multiply(take(a, lane), take(b, lane)));
     }
     product
+}
+
+/// a + b per lane.
+pub(super) fn sum(a: &[Lanes; 4], b: &[Lanes; 4]) -> [Lanes; 4] {
+    let mut sum = *a;
+    for (sum, b) in sum.as_flattened_mut().iter_mut().zip(b.as_flattened()) {
+        *sum += b;
+    }
+    sum
 }
 
 /// One lane.
