@@ -10,7 +10,6 @@ const HELD_BYTES: usize = 512 << 20;
 
 /// One frame, ready to be compared with.
 pub(super) struct TrainingFrame<'f> {
-    pub(super) index: usize,
     pub(super) name: &'f str,
     pub(super) camera: &'f Camera,
     pub(super) pose: &'f Pose,
@@ -77,7 +76,6 @@ impl<'a> TrainingFrames<'a> {
             _ => self.loose.as_ref().expect("a frame that is not held was just decoded"),
         };
         Ok(TrainingFrame {
-            index,
             name: &frame.name,
             camera: &self.sequence.cameras[frame.camera],
             pose: &self.sequence.poses[frame.pose],

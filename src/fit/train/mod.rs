@@ -193,7 +193,7 @@ impl<'a> Trainer<'a> {
         let background = background(recipe.background, self.options.seed, self.iteration);
         let settings = RenderSettings { background, antialiased: false };
         let scratch = &mut self.scratch;
-        scratch.renderer.render_for_backward_into(&posed, frame.camera, &settings, &mut scratch.rendered);
+        scratch.renderer.render_into(&posed, frame.camera, &settings, &mut scratch.rendered);
         composite(&frame.truth.rgb, &frame.truth.alpha, background, &mut scratch.truth);
         let Rendered { image, alpha, .. } = &scratch.rendered;
         let weights = Weights { ssim: recipe.loss.ssim, silhouette: recipe.loss.silhouette };
