@@ -94,7 +94,8 @@ fn a_checkpoint_of_another_fit_is_refused() {
 #[test]
 fn only_what_is_free_changes() {
     let training = small(&subject().train[0], 2);
-    let fixed = "animatable-skinned+free.position=fixed+free.rotation=fixed+free.scale=fixed+free.opacity=false";
+    let fixed =
+        "animatable-skinned+free.position=fixed+free.rotation=fixed+free.scale=fixed+free.opacity=false";
     let options = options(fixed, 5);
     let first = start(&training, &options).unwrap();
     let after = fitted(&training, &options);
@@ -150,8 +151,7 @@ impl FrameGenerator for Broken {
 
 /// The sequence with its truths changed.
 fn broken(sequence: &Sequence, change: impl Fn(usize, &mut Truth)) -> Sequence {
-    let mut truths: Vec<Truth> =
-        (0..sequence.frames.len()).map(|i| sequence.truth(i).unwrap()).collect();
+    let mut truths: Vec<Truth> = (0..sequence.frames.len()).map(|i| sequence.truth(i).unwrap()).collect();
     truths.iter_mut().enumerate().for_each(|(i, truth)| change(i, truth));
     let generator = Arc::new(Broken { truths });
     let frames = sequence.frames.iter().enumerate().map(|(frame, old)| FrameRef {

@@ -83,7 +83,7 @@ impl Planning {
 /// The experiments of `experiments/` in this folder, if there is one; else those that are built in.
 pub(super) fn known_experiments() -> Result<Vec<Experiment>> {
     let folder = PathBuf::from("experiments");
-    Ok(if folder.is_dir() { Experiment::load_folder(&folder)? } else { Experiment::embedded() })
+    Ok(if folder.is_dir() { Experiment::load_folder(&folder)? } else { Experiment::embedded_all() })
 }
 
 pub(super) fn profile(id: &str) -> Result<Profile, String> {

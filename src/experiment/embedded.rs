@@ -1,6 +1,6 @@
 //! The experiment files of this repository, for a program that runs away from it.
 
-/// File name and text of each.
+/// The six tables of the paper: file name and text of each.
 pub const EMBEDDED: &[(&str, &str)] = &[
     ("experiments/table1.toml", include_str!("../../experiments/table1.toml")),
     ("experiments/table2.toml", include_str!("../../experiments/table2.toml")),
@@ -8,4 +8,10 @@ pub const EMBEDDED: &[(&str, &str)] = &[
     ("experiments/table4.toml", include_str!("../../experiments/table4.toml")),
     ("experiments/table5.toml", include_str!("../../experiments/table5.toml")),
     ("experiments/table6.toml", include_str!("../../experiments/table6.toml")),
+];
+
+/// Experiments of our own.
+pub const FURTHER: &[(&str, &str)] = &[
+    ("experiments/parts.toml", include_str!("../../experiments/parts.toml")),
+    ("experiments/swap.toml", include_str!("../../experiments/swap.toml")),
 ];

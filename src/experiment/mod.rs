@@ -25,7 +25,7 @@ mod validate;
 
 pub use crate::data::Capture;
 pub use dataset::{AvatarFile, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
-pub use embedded::EMBEDDED;
+pub use embedded::{EMBEDDED, FURTHER};
 pub use error::Error;
 pub use key::{CodeVersions, canonical_json, content_key};
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};

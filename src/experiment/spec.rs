@@ -1,6 +1,6 @@
 //! The experiment file: one table, described as data.
 
-use super::{Capture, EMBEDDED, Error, Paper, Source, Split, catalog, validate};
+use super::{Capture, EMBEDDED, Error, FURTHER, Paper, Source, Split, catalog, validate};
 use crate::metrics::MetricKind;
 use crate::strategy::PRESETS;
 use serde::{Deserialize, Serialize};
@@ -218,6 +218,12 @@ impl Experiment {
     pub fn embedded() -> Vec<Self> {
         let parse = |(file, text): &(&str, &str)| Self::parse(text, file).expect("tests load every one");
         EMBEDDED.iter().map(parse).collect()
+    }
+
+    /// The six tables and the experiments of our own, compiled in, in the order of their ids.
+    pub fn embedded_all() -> Vec<Self> {
+        let parse = |(file, text): &(&str, &str)| Self::parse(text, file).expect("tests load every one");
+        FURTHER.iter().chain(EMBEDDED).map(parse).collect()
     }
 
     /// Parses and checks the text of an experiment file; `file` is its name in error messages.

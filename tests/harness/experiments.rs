@@ -33,12 +33,13 @@ fn paper(experiment: &Experiment) -> &Paper {
 }
 
 #[test]
-fn the_six_tables_load_from_the_folder_and_are_the_embedded_ones() {
+fn the_experiments_load_from_the_folder_and_are_the_embedded_ones() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
     let loaded = Experiment::load_folder(&folder).unwrap();
     let ids: Vec<&str> = loaded.iter().map(|experiment| experiment.id.as_str()).collect();
-    assert_eq!(ids, ["table1", "table2", "table3", "table4", "table5", "table6"]);
-    assert_eq!(loaded, Experiment::embedded());
+    assert_eq!(ids, ["parts", "swap", "table1", "table2", "table3", "table4", "table5", "table6"]);
+    assert_eq!(loaded, Experiment::embedded_all());
+    assert_eq!(loaded[2..], Experiment::embedded());
 }
 
 #[test]
@@ -126,7 +127,7 @@ fn the_tables_ask_what_the_paper_asks() {
         [
             [Some("hugs-original"), Some("quaternion-average")],
             [Some("ihuman-original"), Some(per_vertex)],
-            [Some("splattingavatar-original"), Some(per_vertex)],
+            [Some("splattingavatar-original"), Some(per_vertex), Some(per_vertex)],
             [Some("animatable-original"), Some("quaternion-average")],
             [Some("animatable-original"), Some("quaternion-average")],
             [None, Some("quaternion-average")],

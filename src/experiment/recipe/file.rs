@@ -50,7 +50,8 @@ fn overlay(below: &mut Table, above: Table) {
 pub(super) fn parse(specification: &str) -> Result<Recipe, Error> {
     let refuse =
         |problem: String, expected: String| Error::invalid("recipe", specification, problem, expected);
-    let mut parts = specification.split('+').map(str::trim);
+    let parts = parts(specification);
+    let mut parts = parts.iter().map(|part| part.trim());
     let id = parts.next().unwrap_or_default();
     let known = || RECIPES.iter().map(|recipe| recipe.id.as_str()).collect::<Vec<_>>().join(", ");
     let base = RECIPES.iter().find(|recipe| recipe.id == id);
@@ -72,6 +73,16 @@ pub(super) fn parse(specification: &str) -> Result<Recipe, Error> {
     })?;
     recipe.check()?;
     Ok(recipe)
+}
+
+/// The parts between the plus signs that are not in quotes.
+fn parts(specification: &str) -> Vec<&str> {
+    let mut quoted = false;
+    let split = |c: char| {
+        quoted ^= c == '"';
+        c == '+' && !quoted
+    };
+    specification.split(split).collect()
 }
 
 /// The value at a dotted path.
@@ -114,6 +125,8 @@ mod tests {
         assert_eq!(recipe.rates.rotation, 0.5);
         assert_eq!(recipe.free.rotation, super::super::FreeRotation::Fixed);
         assert_eq!(recipe.sh_degree, 1);
+        let quoted = parse("pure-skinned+strategy=\"quaternion-average+colour=none\"").expect("varied");
+        assert_eq!(quoted.strategy, "quaternion-average+colour=none");
         assert_eq!(recipe.id, "pure-skinned+rates.rotation=0.5+free.rotation=fixed+sh_degree=1");
     }
 
@@ -133,6 +146,7 @@ mod tests {
             "pure-skinned+start.opacity=1.0",
             "pure-skinned+strategy=none",
             "pure-skinned+iterations=0",
+            "pure-skinned+strategy=\"lbs",
         ] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }
