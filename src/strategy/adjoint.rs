@@ -25,7 +25,7 @@ use rayon::prelude::*;
 /// * barycentric coordinates move the position only, neither the skinning weights mixed with them nor a vertex average;
 /// * frames in which view directions are read do not follow parameters (only those of a conversion of B R_c could).
 ///
-/// The result is the same, bit for bit, for any number of threads.
+/// The result is the same, bit for bit, for any number of threads and any width of vector instructions.
 ///
 /// # Errors
 /// Those of [`pose`](super::pose()), and [`StrategyError::Scene`] for arrays whose length does not fit the bound avatar.
@@ -38,7 +38,20 @@ pub fn pose_backward(
     upstream: &PosedGradient,
     gradient: &mut AvatarGradient,
 ) -> Result<(), StrategyError> {
-    let frame = Frame::new(pulp::Arch::new(), bound, body, strategy)?;
+    backward_on(pulp::Arch::new(), bound, body, strategy, gaussians, upstream, gradient)
+}
+
+/// [`pose_backward`] with the instructions of one kind of processor.
+pub(super) fn backward_on(
+    arch: pulp::Arch,
+    bound: &BoundAvatar,
+    body: &PosedBody<'_>,
+    strategy: &Strategy,
+    gaussians: &Gaussians,
+    upstream: &PosedGradient,
+    gradient: &mut AvatarGradient,
+) -> Result<(), StrategyError> {
+    let frame = Frame::new(arch, bound, body, strategy)?;
     check(bound, gaussians, upstream, gradient)?;
     let parts = Part::split(gradient, bound.sh_count());
     parts.into_par_iter().enumerate().for_each(|(number, gradient)| {
@@ -240,12 +253,12 @@ impl AdjointChunk<'_, '_, '_> {
         let torque = (self.frame.converts() && self.rotates_sh()).then(|| self.torque(input, turn));
         match (self.frame.strategy.covariance, torque) {
             (CovarianceChoice::Rotate | CovarianceChoice::Surfel, torque) => {
-                let torque = torque.unwrap_or_default();
-                rotate::turn_adjoint(source, input, turn, of_covariance, &torque)
+                rotate::turn_adjoint(source, input, turn, of_covariance, torque.as_ref())
             }
             (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, None) => *of_covariance,
-            (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, Some(torque)) => {
-                let of_colour = rotate::turn_adjoint(source, input, turn, &[[0.0; LANES]; 4], &torque);
+            (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, torque) => {
+                let none = [[0.0; LANES]; 4];
+                let of_colour = rotate::turn_adjoint(source, input, turn, &none, torque.as_ref());
                 rotate::sum(of_covariance, &of_colour)
             }
         }
@@ -267,7 +280,7 @@ impl AdjointChunk<'_, '_, '_> {
 
     /// From the discs of a block to its Gaussians.
     #[inline(never)]
-    fn from_discs(
+    fn through_discs(
         &self,
         position: usize,
         input: &BlockInput<'_>,
@@ -281,7 +294,8 @@ impl AdjointChunk<'_, '_, '_> {
             let canonical = take(&own.rotations, lane);
             let Some(disc) = Disc::nearest(canonical, surface, input.gaussian(lane)) else { continue };
             let of_scales = [0, 1, 2].map(|axis: usize| log_scales[axis][lane]);
-            let (of_rotation, of_scales) = disc.adjoint(canonical, take(rotations, lane), of_scales);
+            let (snapped, of_snapped) = (take(&input.block.rotations, lane), take(rotations, lane));
+            let (of_rotation, of_scales) = disc.adjoint(canonical, snapped, of_snapped, of_scales);
             put(rotations, lane, of_rotation);
             (0..3).for_each(|axis| log_scales[axis][lane] = of_scales[axis]);
         }
@@ -327,7 +341,7 @@ impl Visitor for AdjointChunk<'_, '_, '_> {
         let mut rotations = self.of_rotations(input, turn, &of_covariance.rotation);
         let mut units = &block.rotations;
         if choice == CovarianceChoice::Surfel {
-            self.from_discs(position, input, &mut rotations, &mut log_scales);
+            self.through_discs(position, input, &mut rotations, &mut log_scales);
             let own = &self.frame.bound.chunks(CovarianceChoice::Rotate)[self.number];
             units = &own.blocks[position].rotations;
         }

@@ -259,8 +259,11 @@ impl Visitor for PoseChunk<'_, '_, '_> {
 #[cfg(test)]
 mod tests {
     use super::super::PRESETS;
+    use super::super::adjoint::backward_on;
     use super::*;
-    use crate::scene::{Avatar, Binding, Gaussians, Pose, RestBody, Skeleton, SkinWeights};
+    use crate::scene::{
+        Avatar, AvatarGradient, Binding, Gaussians, Pose, PosedGradient, RestBody, Skeleton, SkinWeights,
+    };
     use glam::DVec3;
 
     /// A fan of triangles over a chain of six joints, and a Gaussian per vertex that hangs on one to six of them.
@@ -303,6 +306,24 @@ mod tests {
                 pose_on(pulp::Arch::Scalar, &bound, &body, &preset.strategy, &mut PoseBuffers::default())
                     .unwrap();
             assert_eq!(narrow, pose(&bound, &body, &preset.strategy).unwrap(), "{}", preset.id);
+
+            // The pose serves as its own derivative.
+            let upstream = PosedGradient {
+                means: narrow.means,
+                factors: narrow.factors,
+                opacities: narrow.opacities.into_owned(),
+                sh: narrow.sh.into_owned(),
+                ..PosedGradient::default()
+            };
+            let [narrow, wide] = [pulp::Arch::Scalar, pulp::Arch::new()].map(|arch| {
+                let mut gradient = AvatarGradient::default();
+                let gaussians = &avatar.gaussians;
+                gradient.reset(gaussians, false);
+                let strategy = &preset.strategy;
+                backward_on(arch, &bound, &body, strategy, gaussians, &upstream, &mut gradient).unwrap();
+                gradient
+            });
+            assert_eq!(narrow, wide, "{}", preset.id);
         }
     }
 }

@@ -96,10 +96,12 @@ impl Disc {
     }
 
     /// The derivatives with respect to R_c (without a part along it) and the log scales of the Gaussian, from those with
-    /// respect to the disc's. Only the in-plane angle follows R_c; the thickness follows nothing.
+    /// respect to the disc's. Only the in-plane angle follows R_c; the thickness follows nothing. `own` and `snapped` are
+    /// the quaternions of the Gaussian and of the disc.
     pub(super) fn adjoint(
         &self,
         own: Quaternion<f32>,
+        snapped: Quaternion<f32>,
         of_rotation: Quaternion<f32>,
         of_log_scales: [f32; 3],
     ) -> (Quaternion<f32>, [f32; 3]) {
@@ -113,7 +115,7 @@ impl Disc {
         }
         // A larger angle turns the disc about its normal.
         let [n, r1, r2] = self.frame;
-        let turned = rotation::multiply([0.0, n[0], n[1], n[2]], self.rotation());
+        let turned = rotation::multiply([0.0, n[0], n[1], n[2]], snapped);
         let of_angle = 0.5 * dot4(turned, of_rotation);
         let (of_cosine, of_sine) = (-of_angle * sine / squared, of_angle * cosine / squared);
         let of_u = [0, 1, 2].map(|k: usize| of_cosine * r1[k] + of_sine * r2[k]);

@@ -21,20 +21,19 @@ pub fn quaternion_to_matrix_raw<T: Real>([w, x, y, z]: Quaternion<T>, g: &Matrix
 
 /// Of [`matrix_to_quaternion_raw`](super::matrix_to_quaternion_raw) at `m`, on the branch that `m` takes; each entry of
 /// `m` by itself. The four diagonal terms that choose the branch sum to 4, so the divisor's floor never acts.
+#[inline]
 pub fn matrix_to_quaternion_raw<T: Real>(m: Matrix3<T>, g: Quaternion<T>) -> Matrix3<T> {
     let outer = four_outer_product(m);
     let (best, magnitude) = leading(&outer);
     let half = T::ONE / (T::from_f64(2.0) * magnitude);
     // p_best = √s / 2 and p_j = o_j / (2 √s) with s on the diagonal and o_j beside it.
-    let along: T = (0..4).filter(|&j| j != best).fold(T::ZERO, |sum, j| sum + g[j] * outer[best][j] * half);
+    let along = (dot4(g, outer[best]) - g[best] * outer[best][best]) * half;
     let mut row = g.map(|c| c * half);
     row[best] = T::from_f64(0.5) * (g[best] * half - along / (magnitude * magnitude));
-    // o = row `best` of a symmetric matrix: whichever of a pair it is, it is the same entry of m.
-    let of = |i: usize, j: usize| match best {
-        b if b == i => row[j],
-        b if b == j => row[i],
-        _ => T::ZERO,
-    };
+    // Row `best` of a symmetric matrix: whichever of a pair it is, it is the same entry of m.
+    let mut of_outer = [[T::ZERO; 4]; 4];
+    of_outer[best] = row;
+    let of = |i: usize, j: usize| of_outer[i][j] + of_outer[j][i];
     let (wx, wy, wz) = (of(0, 1), of(0, 2), of(0, 3));
     let (xy, xz, yz) = (of(1, 2), of(1, 3), of(2, 3));
     let diagonal = |axis: usize| if best == 0 || best == axis { row[best] } else { -row[best] };
@@ -50,6 +49,7 @@ pub fn normalize<T: Real>(unit: Quaternion<T>, inverse_length: T, g: Quaternion<
 
 /// The derivative with respect to a further rotation by ω (axis times angle, at 0), `exp(ω/2) ⊗ q`, as one with respect
 /// to the unit quaternion q that has no part along q.
+#[inline]
 pub fn from_torque<T: Real>(unit: Quaternion<T>, [x, y, z]: [T; 3]) -> Quaternion<T> {
     let two = T::from_f64(2.0);
     super::multiply([T::ZERO, two * x, two * y, two * z], unit)

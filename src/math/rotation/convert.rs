@@ -64,6 +64,7 @@ pub fn matrix_to_quaternion_raw<T: Real>(m: Matrix3<T>) -> Quaternion<T> {
 }
 
 /// The candidate with the largest component of its own (the first of equals), and twice that component.
+#[inline]
 pub(super) fn leading<T: Real>(outer: &[[T; 4]; 4]) -> (usize, T) {
     let magnitudes = [outer[0][0], outer[1][1], outer[2][2], outer[3][3]].map(|s| s.max(T::ZERO).sqrt());
     let mut best = 0;

@@ -62,7 +62,7 @@ pub(super) fn converted_adjoint(
     input: &BlockInput<'_>,
     turn: &Turn,
     posed: &[Lanes; 4],
-    torque: &[Lanes; 3],
+    torque: Option<&[Lanes; 3]>,
 ) -> [Lanes; 4] {
     let mut result = [[0.0; LANES]; 4];
     for lane in 0..LANES {
@@ -74,22 +74,22 @@ pub(super) fn converted_adjoint(
             put(&mut result, lane, of_posed);
             continue;
         };
-        // R = unit ⊗ R_c⁻¹: turning R_c on turns R back, seen from where R starts.
-        let torque = [0, 1, 2].map(|axis: usize| torque[axis][lane]);
-        let relative = rotation::conjugate(take(&turn.relative, lane));
-        let back = matrix3::apply(rotation::quaternion_to_matrix_raw(relative), torque).map(|t| -t);
-        let mut of_unit = rotation::adjoint::from_torque(unit, torque);
-        if projection == LbsProjection::MatrixToQuaternion {
-            of_unit = sum(of_unit, of_posed);
-        }
-        let mut of_raw = rotation::adjoint::normalize(unit, 1.0 / dot4(unit, raw), of_unit);
-        if projection == LbsProjection::MatrixToQuaternionRaw {
-            of_raw = sum(of_raw, of_posed);
+        let of_length = |of_unit| rotation::adjoint::normalize(unit, 1.0 / dot4(unit, raw), of_unit);
+        let raw_is_drawn = projection == LbsProjection::MatrixToQuaternionRaw;
+        let mut of_raw = if raw_is_drawn { of_posed } else { of_length(of_posed) };
+        let mut of_canonical = [0.0; 4];
+        if let Some(torque) = torque {
+            // R = unit ⊗ R_c⁻¹: turning R_c on turns R back, seen from where R starts.
+            let torque = [0, 1, 2].map(|axis: usize| torque[axis][lane]);
+            let relative = rotation::conjugate(take(&turn.relative, lane));
+            let back = matrix3::apply(rotation::quaternion_to_matrix_raw(relative), torque).map(|t| -t);
+            of_raw = sum(of_raw, of_length(rotation::adjoint::from_torque(unit, torque)));
+            of_canonical = rotation::adjoint::from_torque(canonical, back);
         }
         let of_turned = rotation::adjoint::matrix_to_quaternion_raw(turned, of_raw);
         let of_own = matrix3::multiply(matrix3::transpose(b), of_turned);
         let through_turned = rotation::adjoint::quaternion_to_matrix_raw(canonical, &of_own);
-        put(&mut result, lane, sum(through_turned, rotation::adjoint::from_torque(canonical, back)));
+        put(&mut result, lane, sum(of_canonical, through_turned));
     }
     result
 }

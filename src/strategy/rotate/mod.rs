@@ -135,7 +135,7 @@ pub(super) fn turn_adjoint(
     input: &BlockInput<'_>,
     turn: &Turn,
     posed: &[Lanes; 4],
-    torque: &[Lanes; 3],
+    torque: Option<&[Lanes; 3]>,
 ) -> [Lanes; 4] {
     match source {
         Source::Lbs(projection) if projection.converts() && !input.block.influences.is_empty() => {
