@@ -99,7 +99,8 @@ impl Shares {
         let x = Wide::load(l, &COLUMN) + n(left as f32);
         let y = Wide::load(l, &ROW) + n(top as f32);
         let mut transmittance = Wide::load(l, open);
-        self.count = 0;
+        let (shares, indices) = (&mut self.shares[..list.len()], &mut self.splats[..list.len()]);
+        let mut count = 0;
         for run in list.chunks(BETWEEN_CHECKS) {
             if !n(0.0).less(transmittance).any() {
                 break;
@@ -109,14 +110,14 @@ impl Shares {
                 let after = uncapped.min(n(MAX_ALPHA)).neg_mul_add(transmittance, transmittance);
                 let enough = after.at_least(n(LEAST_TRANSMITTANCE));
                 let uncapped = enough.keep(uncapped);
-                self.shares[self.count] =
-                    Share { uncapped: uncapped.store(), transmittance: transmittance.store() };
-                self.splats[self.count] = i;
+                shares[count] = Share { uncapped: uncapped.store(), transmittance: transmittance.store() };
+                indices[count] = i;
                 // Without a branch: the next splat overwrites one that gave nothing.
-                self.count += usize::from(n(0.0).less(uncapped).any());
+                count += usize::from(n(0.0).less(uncapped).any());
                 transmittance = enough.keep(after);
             }
         }
+        self.count = count;
         *open = transmittance.store();
     }
 }

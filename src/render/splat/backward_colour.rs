@@ -72,16 +72,36 @@ fn unclamped<const K: usize, L: Lanes>(sh: &[Wide<L>; 48], basis: &[Wide<L>; 16]
 fn by_coefficient<const K: usize, L: Lanes>(l: L, sh: &[[f32; 3]], touched: Touched) -> [Wide<L>; 48] {
     let mut out = [Wide::splat(l, 0.0); 48];
     for part in (0..3 * K).step_by(LANES) {
-        let mut rows = [[0.0; LANES]; LANES];
+        let mut rows = [Wide::splat(l, 0.0); LANES];
         for (lane, (row, sh)) in rows.iter_mut().zip(sh.chunks_exact(K)).enumerate() {
             if touched.has(lane) {
-                let values = &sh.as_flattened()[part..(part + LANES).min(3 * K)];
-                row[..values.len()].copy_from_slice(values);
+                *row = load_part(l, &sh.as_flattened()[part..]);
             }
         }
-        out[part..part + LANES].copy_from_slice(&Wide::load_transposed(l, &rows));
+        out[part..part + LANES].copy_from_slice(&Wide::transpose(&rows));
     }
     out
+}
+
+/// The first sixteen values, or as many as there are and then zeros.
+#[inline(always)]
+fn load_part<L: Lanes>(l: L, values: &[f32]) -> Wide<L> {
+    if let Some(sixteen) = values.first_chunk() {
+        return Wide::load(l, sixteen);
+    }
+    let mut padded = [0.0; LANES];
+    padded[..values.len()].copy_from_slice(values);
+    Wide::load(l, &padded)
+}
+
+/// Writes the first sixteen values, or as many as there are.
+#[inline(always)]
+fn store_part<L: Lanes>(row: Wide<L>, values: &mut [f32]) {
+    if let Some(sixteen) = values.first_chunk_mut() {
+        *sixteen = row.store();
+    } else {
+        values.copy_from_slice(&row.store()[..values.len()]);
+    }
 }
 
 /// Zeros for Gaussians that were not touched.
@@ -91,17 +111,14 @@ fn store_coefficients<const K: usize, L: Lanes>(
     touched: Touched,
     out: &mut [[f32; 3]],
 ) {
+    let zero = gradient[0].constant(0.0);
     for part in (0..3 * K).step_by(LANES) {
-        let mut columns = [gradient[0]; LANES];
+        let mut columns = [zero; LANES];
         columns.copy_from_slice(&gradient[part..part + LANES]);
         let rows = Wide::transpose(&columns);
         for (lane, (row, out)) in rows.iter().zip(out.chunks_exact_mut(K)).enumerate() {
-            let values = &mut out.as_flattened_mut()[part..(part + LANES).min(3 * K)];
-            if touched.has(lane) {
-                values.copy_from_slice(&row.store()[..values.len()]);
-            } else {
-                values.fill(0.0);
-            }
+            let row = if touched.has(lane) { *row } else { zero };
+            store_part(row, &mut out.as_flattened_mut()[part..]);
         }
     }
 }
