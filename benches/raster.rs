@@ -7,8 +7,9 @@
 //! cargo bench --bench raster -- --quick --avx2         # with narrower vectors than the processor has
 //! ```
 //!
-//! First a table: the least wall time of many frames on one and on two threads (into existing memory, and into fresh
-//! memory), and the thread time of each phase. Then criterion's statistics of the two figures that the README gives.
+//! First a table: the least wall time of many frames on one and on two threads (into existing memory, into fresh memory,
+//! and with the way back to the Gaussians' derivatives), and the thread time of each phase of the drawing. Then criterion's
+//! statistics of the figures that the README gives.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints its results")]
 
 #[path = "../tests/support/splat_scene.rs"]
@@ -16,8 +17,8 @@ mod splat_scene;
 
 use criterion::Criterion;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use skinsplat::render::splat::{Phase, PhaseTimes, RenderSettings, Renderer, SimdLevel};
-use skinsplat::scene::{Camera, Gaussians, Posed, Rendered};
+use skinsplat::render::splat::{Derivatives, Phase, PhaseTimes, RenderSettings, Renderer, SimdLevel};
+use skinsplat::scene::{Camera, Gaussians, Image, Posed, PosedGradient, Rendered, RenderedGradient};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -35,7 +36,9 @@ fn main() {
         patterns.peek().is_none() || patterns.any(|pattern| line.contains(pattern))
     };
     let cameras = cameras();
-    println!("scene view        threads   ms  fresh |  thread ms: preprocess  sort   bin  blend  write");
+    println!(
+        "scene view        threads   ms  fresh  +back |  thread ms: preprocess  sort   bin  blend  write"
+    );
     for scene in ["S", "M", "L"] {
         let views: Vec<_> = cameras.iter().filter(|(view, ..)| chosen(&format!("{scene} {view}"))).collect();
         let Some(gaussians) = (!views.is_empty()).then(|| gaussians(scene)).flatten() else { continue };
@@ -65,6 +68,17 @@ fn criterion(cameras: &[(String, Camera, RenderSettings)]) {
         criterion.bench_function(&format!("render/{scene}/{view}/2 threads"), |b| {
             b.iter(|| pool.install(|| renderer.render_into(&posed, camera, settings, &mut rendered)));
         });
+        let upstream = upstream(camera);
+        let mut gradient = PosedGradient::default();
+        criterion.bench_function(&format!("render and adjoint/{scene}/{view}/2 threads"), |b| {
+            b.iter(|| {
+                pool.install(|| {
+                    renderer.render_into(&posed, camera, settings, &mut rendered);
+                    let exact = Derivatives::Exact;
+                    renderer.backward(&posed, camera, settings, &rendered, &upstream, exact, &mut gradient);
+                });
+            });
+        });
     }
     criterion.final_summary();
 }
@@ -83,6 +97,14 @@ impl Frame<'_> {
         let mut rendered: Rendered = renderer.render(self.posed, self.camera, self.settings);
         let reused = least(|| renderer.render_into(self.posed, self.camera, self.settings, &mut rendered));
         let fresh = least(|| drop(renderer.render(self.posed, self.camera, self.settings)));
+        let upstream = upstream(self.camera);
+        let mut gradient = PosedGradient::default();
+        let back = least(|| {
+            let (posed, camera, settings) = (self.posed, self.camera, self.settings);
+            renderer.render_into(posed, camera, settings, &mut rendered);
+            let exact = Derivatives::Exact;
+            renderer.backward(posed, camera, settings, &rendered, &upstream, exact, &mut gradient);
+        });
         let mut phases = [f64::INFINITY; PHASES.len()];
         least(|| {
             let times: PhaseTimes =
@@ -92,14 +114,24 @@ impl Frame<'_> {
             }
         });
         let [preprocess, sort, bin, blend, write] = phases;
-        format!("{reused:6.2} {fresh:6.2} | {preprocess:21.2} {sort:5.2} {bin:5.2} {blend:6.2} {write:6.2}")
+        format!(
+            "{reused:6.2} {fresh:6.2} {back:6.2} | {preprocess:21.2} {sort:5.2} {bin:5.2} {blend:6.2} {write:6.2}"
+        )
     }
+}
+
+/// Derivatives of the kind that a fit has: of every pixel and channel, of either sign.
+fn upstream(camera: &Camera) -> RenderedGradient {
+    let (width, height) = (camera.width as usize, camera.height as usize);
+    let value = |i: usize| ((i * 7919) % 2003) as f32 / 1001.0 - 1.0;
+    let pixels = (0..width * height).map(|i| [value(3 * i), value(3 * i + 1), value(3 * i + 2)]).collect();
+    RenderedGradient { image: Image::new(width, height, pixels).unwrap(), alpha: None }
 }
 
 /// The least time of a call, ms.
 fn least(mut call: impl FnMut()) -> f64 {
     let (start, mut least) = (Instant::now(), f64::INFINITY);
-    while start.elapsed() < BUDGET / 3 {
+    while start.elapsed() < BUDGET / 4 {
         let before = Instant::now();
         call();
         least = least.min(before.elapsed().as_secs_f64() * 1e3);

@@ -1,11 +1,13 @@
 //! The definition of the 3DGS image, in f64, pixel by pixel and splat by splat, with nothing clever.
-#![allow(unreachable_pub, reason = "shared by tests")]
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "shared by tests")]
 
 use glam::{DMat2, DMat3, DVec2, DVec3};
 use skinsplat::render::splat::RenderSettings;
 use skinsplat::scene::{Camera, ColourClamp, Posed};
 
 struct Splat {
+    /// Of its Gaussian.
+    index: usize,
     depth: f64,
     mean: DVec2,
     conic: DMat2,
@@ -17,36 +19,75 @@ struct Splat {
 
 /// Colour over the background, alpha and depth of every pixel, row by row.
 pub fn render(posed: &Posed, camera: &Camera, settings: &RenderSettings) -> Vec<[f64; 5]> {
+    render_chosen(posed, camera, settings, &chosen(posed, camera, settings))
+}
+
+/// The Gaussians that every pixel blends, front to back.
+pub fn chosen(posed: &Posed, camera: &Camera, settings: &RenderSettings) -> Vec<Vec<usize>> {
     let mut splats: Vec<Splat> =
         (0..posed.len()).filter_map(|i| project(posed, i, camera, settings)).collect();
     splats.sort_by(|a, b| (a.depth as f32).total_cmp(&(b.depth as f32)));
+    pixels(camera).map(|pixel| choose(&splats, pixel)).collect()
+}
+
+/// [`render`] with every pixel blending the Gaussians that it is told to: smooth in all parameters.
+pub fn render_chosen(
+    posed: &Posed,
+    camera: &Camera,
+    settings: &RenderSettings,
+    chosen: &[Vec<usize>],
+) -> Vec<[f64; 5]> {
+    let splats: Vec<Option<Splat>> = (0..posed.len()).map(|i| project(posed, i, camera, settings)).collect();
     let background = DVec3::from_array(settings.background.map(f64::from));
-    (0..camera.height)
-        .flat_map(|y| (0..camera.width).map(move |x| DVec2::new(f64::from(x), f64::from(y))))
-        .map(|pixel| blend(&splats, pixel, background))
+    std::iter::zip(pixels(camera), chosen)
+        .map(|(pixel, chosen)| blend(chosen.iter().map(|&i| splats[i].as_ref().unwrap()), pixel, background))
         .collect()
 }
 
-fn blend(splats: &[Splat], pixel: DVec2, background: DVec3) -> [f64; 5] {
-    let (mut transmittance, mut colour, mut depth) = (1.0, DVec3::ZERO, 0.0);
+fn pixels(camera: &Camera) -> impl Iterator<Item = DVec2> {
+    let width = camera.width;
+    (0..camera.height).flat_map(move |y| (0..width).map(move |x| DVec2::new(f64::from(x), f64::from(y))))
+}
+
+impl Splat {
+    fn power(&self, pixel: DVec2) -> f64 {
+        let d = self.mean - pixel;
+        -0.5 * d.dot(self.conic * d)
+    }
+
+    fn alpha(&self, pixel: DVec2) -> f64 {
+        (self.opacity * self.power(pixel).exp()).min(0.99)
+    }
+}
+
+fn choose(splats: &[Splat], pixel: DVec2) -> Vec<usize> {
+    let (mut transmittance, mut chosen) = (1.0, Vec::new());
     for splat in splats {
         let [x0, x1, y0, y1] = splat.pixels;
         if pixel.x < x0 || pixel.x >= x1 || pixel.y < y0 || pixel.y >= y1 {
             continue;
         }
-        let d = splat.mean - pixel;
-        let power = -0.5 * d.dot(splat.conic * d);
-        let alpha = (splat.opacity * power.exp()).min(0.99);
-        if power > 0.0 || alpha < 1.0 / 255.0 {
+        let alpha = splat.alpha(pixel);
+        if splat.power(pixel) > 0.0 || alpha < 1.0 / 255.0 {
             continue;
         }
         let after = transmittance * (1.0 - alpha);
         if after < 1e-4 {
             break;
         }
+        transmittance = after;
+        chosen.push(splat.index);
+    }
+    chosen
+}
+
+fn blend<'a>(splats: impl Iterator<Item = &'a Splat>, pixel: DVec2, background: DVec3) -> [f64; 5] {
+    let (mut transmittance, mut colour, mut depth) = (1.0, DVec3::ZERO, 0.0);
+    for splat in splats {
+        let alpha = splat.alpha(pixel);
         colour += splat.colour * (alpha * transmittance);
         depth += splat.depth * alpha * transmittance;
-        transmittance = after;
+        transmittance *= 1.0 - alpha;
     }
     let colour = colour + background * transmittance;
     [colour.x, colour.y, colour.z, 1.0 - transmittance, depth]
@@ -87,6 +128,7 @@ fn project(posed: &Posed, i: usize, camera: &Camera, settings: &RenderSettings) 
     let compensation =
         if settings.antialiased { (bare.determinant() / determinant).max(0.000_025).sqrt() } else { 1.0 };
     Some(Splat {
+        index: i,
         depth: p.z,
         mean,
         conic: covariance.inverse(),

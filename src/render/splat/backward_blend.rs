@@ -77,6 +77,7 @@ pub(super) struct Shares {
     /// Index of each within its segment.
     splats: Vec<u16>,
     count: usize,
+    pending: Pending,
 }
 
 impl Shares {
@@ -98,7 +99,8 @@ impl Shares {
         let x = Wide::load(l, &COLUMN) + n(left as f32);
         let y = Wide::load(l, &ROW) + n(top as f32);
         let mut transmittance = Wide::load(l, open);
-        self.count = 0;
+        let (shares, indices) = (&mut self.shares[..list.len()], &mut self.splats[..list.len()]);
+        let mut count = 0;
         for run in list.chunks(BETWEEN_CHECKS) {
             if !n(0.0).less(transmittance).any() {
                 break;
@@ -108,14 +110,14 @@ impl Shares {
                 let after = uncapped.min(n(MAX_ALPHA)).neg_mul_add(transmittance, transmittance);
                 let enough = after.at_least(n(LEAST_TRANSMITTANCE));
                 let uncapped = enough.keep(uncapped);
-                self.shares[self.count] =
-                    Share { uncapped: uncapped.store(), transmittance: transmittance.store() };
-                self.splats[self.count] = i;
+                shares[count] = Share { uncapped: uncapped.store(), transmittance: transmittance.store() };
+                indices[count] = i;
                 // Without a branch: the next splat overwrites one that gave nothing.
-                self.count += usize::from(n(0.0).less(uncapped).any());
+                count += usize::from(n(0.0).less(uncapped).any());
                 transmittance = enough.keep(after);
             }
         }
+        self.count = count;
         *open = transmittance.store();
     }
 }
@@ -123,7 +125,7 @@ impl Shares {
 /// One block on the way back.
 pub(super) struct BlockAdjoint<'a> {
     pub(super) corner: [usize; 2],
-    pub(super) shares: &'a Shares,
+    pub(super) shares: &'a mut Shares,
     /// Of the segment.
     pub(super) splats: &'a [Splat],
     /// Place in `sums` of each splat of the segment.
@@ -133,6 +135,8 @@ pub(super) struct BlockAdjoint<'a> {
 }
 
 /// Vectors of pixels of up to sixteen splats, before they are summed.
+#[derive(Debug, Default)]
+#[repr(C, align(64))]
 struct Pending {
     power: [[f32; 16]; 16],
     weight: [[f32; 16]; 16],
@@ -143,29 +147,20 @@ struct Pending {
 impl BlockAdjoint<'_> {
     /// Adds to `sums` what the block's pixels ask of its splats.
     #[inline(always)]
-    pub(super) fn run<L: Lanes>(&self, l: L, upstream: &mut BlockUpstream, sums: &mut [SplatSums]) {
+    pub(super) fn run<L: Lanes>(self, l: L, upstream: &mut BlockUpstream, sums: &mut [SplatSums]) {
         let n = |value: f32| Wide::splat(l, value);
         let colour = each(upstream.colour, |c| Wide::load(l, &c));
         let mut after = Wide::load(l, &upstream.behind);
-        let mut pending = Pending {
-            power: [[0.0; 16]; 16],
-            weight: [[0.0; 16]; 16],
-            mean: [[0.0; 16]; 2],
-            places: [0; 16],
-        };
-        let count = self.shares.count;
-        let shares = self.shares.shares[..count].rchunks(16);
-        for (shares, indices) in shares.zip(self.shares.splats[..count].rchunks(16)) {
+        let Shares { shares, splats, count, pending } = &mut *self.shares;
+        for (shares, indices) in shares[..*count].rchunks(16).zip(splats[..*count].rchunks(16)) {
             for (k, (share, &i)) in shares.iter().zip(indices).enumerate().rev() {
                 let i = usize::from(i);
                 let paint = &self.splats[i].paint;
                 let uncapped = Wide::load(l, &share.uncapped);
                 let transmittance = Wide::load(l, &share.transmittance);
                 let alpha = uncapped.min(n(MAX_ALPHA));
-                let along = colour[2].mul_add(
-                    n(paint.colour[2]),
-                    colour[1].mul_add(n(paint.colour[1]), colour[0] * n(paint.colour[0])),
-                );
+                let [r, g, b] = each(paint.colour, n);
+                let along = colour[2].mul_add(b, colour[1].mul_add(g, colour[0] * r));
                 let difference = along - after;
                 let free = n(self.greatest_alpha).at_least(uncapped).keep(uncapped);
                 pending.power[k] = (free * transmittance * difference).store();
@@ -175,27 +170,28 @@ impl BlockAdjoint<'_> {
                 pending.places[k] = self.places[i];
                 after = alpha.mul_add(difference, after);
             }
-            self.flush(l, upstream, &pending, shares.len(), sums);
+            pending.flush(l, self.corner, upstream, shares.len(), sums);
         }
         upstream.behind = after.store();
     }
+}
 
+impl Pending {
     /// Sums over pixels of the first `count` pending splats.
     #[inline(always)]
     fn flush<L: Lanes>(
         &self,
         l: L,
+        corner: [usize; 2],
         upstream: &BlockUpstream,
-        pending: &Pending,
         count: usize,
         sums: &mut [SplatSums],
     ) {
         let n = |value: f32| Wide::splat(l, value);
-        let by_splat = |rows: &[[f32; 16]; 16]| Wide::transpose(&each(*rows, |row| Wide::load(l, &row)));
         let mut out = [n(0.0); 16];
-        let centre = each([0, 1], |axis| Wide::load(l, &pending.mean[axis]) - n(self.corner[axis] as f32));
-        out[..COLOUR_SUMS].copy_from_slice(&moments(&by_splat(&pending.power), centre));
-        let weight = by_splat(&pending.weight);
+        let centre = each([0, 1], |axis| Wide::load(l, &self.mean[axis]) - n(corner[axis] as f32));
+        out[..COLOUR_SUMS].copy_from_slice(&moments(&Wide::load_transposed(l, &self.power), centre));
+        let weight = Wide::load_transposed(l, &self.weight);
         for (out, upstream) in out[COLOUR_SUMS..].iter_mut().zip(&upstream.colour) {
             // Two sums, since one would wait for itself.
             let mut parts = [weight[0] * n(upstream[0]), weight[1] * n(upstream[1])];
@@ -205,7 +201,7 @@ impl BlockAdjoint<'_> {
             *out = parts[0] + parts[1];
         }
         let rows = Wide::transpose(&out);
-        for (row, &place) in rows.iter().zip(&pending.places[..count]) {
+        for (row, &place) in rows.iter().zip(&self.places[..count]) {
             let sum = &mut sums[place as usize].0;
             *sum = (Wide::load(l, sum) + *row).store();
         }
@@ -216,8 +212,10 @@ impl BlockAdjoint<'_> {
 /// `g` by pixel, row by row.
 #[inline(always)]
 fn moments<L: Lanes>(g: &[Wide<L>; 16], [cx, cy]: [Wide<L>; 2]) -> [Wide<L>; 6] {
-    let row = |y: usize| line_moments([g[4 * y], g[4 * y + 1], g[4 * y + 2], g[4 * y + 3]]);
-    let [[a, ax, axx], [b, bx, bxx], [c, cx1, cxx], [d, dx1, dxx]] = [row(0), row(1), row(2), row(3)];
+    let [a, ax, axx] = line_moments([g[0], g[1], g[2], g[3]]);
+    let [b, bx, bxx] = line_moments([g[4], g[5], g[6], g[7]]);
+    let [c, cx1, cxx] = line_moments([g[8], g[9], g[10], g[11]]);
+    let [d, dx1, dxx] = line_moments([g[12], g[13], g[14], g[15]]);
     let [all, y, yy] = line_moments([a, b, c, d]);
     let [x, xy, _] = line_moments([ax, bx, cx1, dx1]);
     let xx = (axx + bxx) + (cxx + dxx);

@@ -3,6 +3,7 @@
 use super::colour::{C1, C2, C3, Direction};
 use super::lanes::Lanes;
 use super::preprocess::LANES;
+use super::project::dot;
 use super::wide::{Wide, each};
 use crate::scene::ColourClamp;
 
@@ -54,14 +55,16 @@ pub(super) fn coefficients<const K: usize, L: Lanes>(
 /// The colour before clamping, with the bits that the forward pass finds.
 #[inline(always)]
 fn unclamped<const K: usize, L: Lanes>(sh: &[Wide<L>; 48], basis: &[Wide<L>; 16]) -> [Wide<L>; 3] {
-    each([0, 1, 2], |c| {
+    let mut colour = [sh[0]; 3];
+    for c in 0..3 {
         let mut sums = [sh[0].constant(0.5), sh[0].constant(0.0)];
         for k in 0..K {
             let sum = if k == K - 1 { 1 } else { k % 2 };
             sums[sum] = basis[k].mul_add(sh[3 * k + c], sums[sum]);
         }
-        sums[0] + sums[1]
-    })
+        colour[c] = sums[0] + sums[1];
+    }
+    colour
 }
 
 /// The touched Gaussians' coefficients, one per vector; zeros for the others, and beyond the degree.
@@ -69,17 +72,36 @@ fn unclamped<const K: usize, L: Lanes>(sh: &[Wide<L>; 48], basis: &[Wide<L>; 16]
 fn by_coefficient<const K: usize, L: Lanes>(l: L, sh: &[[f32; 3]], touched: Touched) -> [Wide<L>; 48] {
     let mut out = [Wide::splat(l, 0.0); 48];
     for part in (0..3 * K).step_by(LANES) {
-        let mut rows = [[0.0; LANES]; LANES];
+        let mut rows = [Wide::splat(l, 0.0); LANES];
         for (lane, (row, sh)) in rows.iter_mut().zip(sh.chunks_exact(K)).enumerate() {
             if touched.has(lane) {
-                let values = &sh.as_flattened()[part..(part + LANES).min(3 * K)];
-                row[..values.len()].copy_from_slice(values);
+                *row = load_part(l, &sh.as_flattened()[part..]);
             }
         }
-        let columns = Wide::transpose(&each(rows, |row| Wide::load(l, &row)));
-        out[part..part + LANES].copy_from_slice(&columns);
+        out[part..part + LANES].copy_from_slice(&Wide::transpose(&rows));
     }
     out
+}
+
+/// The first sixteen values, or as many as there are and then zeros.
+#[inline(always)]
+fn load_part<L: Lanes>(l: L, values: &[f32]) -> Wide<L> {
+    if let Some(sixteen) = values.first_chunk() {
+        return Wide::load(l, sixteen);
+    }
+    let mut padded = [0.0; LANES];
+    padded[..values.len()].copy_from_slice(values);
+    Wide::load(l, &padded)
+}
+
+/// Writes the first sixteen values, or as many as there are.
+#[inline(always)]
+fn store_part<L: Lanes>(row: Wide<L>, values: &mut [f32]) {
+    if let Some(sixteen) = values.first_chunk_mut() {
+        *sixteen = row.store();
+    } else {
+        values.copy_from_slice(&row.store()[..values.len()]);
+    }
 }
 
 /// Zeros for Gaussians that were not touched.
@@ -89,17 +111,14 @@ fn store_coefficients<const K: usize, L: Lanes>(
     touched: Touched,
     out: &mut [[f32; 3]],
 ) {
+    let zero = gradient[0].constant(0.0);
     for part in (0..3 * K).step_by(LANES) {
-        let mut columns = [gradient[0]; LANES];
+        let mut columns = [zero; LANES];
         columns.copy_from_slice(&gradient[part..part + LANES]);
         let rows = Wide::transpose(&columns);
         for (lane, (row, out)) in rows.iter().zip(out.chunks_exact_mut(K)).enumerate() {
-            let values = &mut out.as_flattened_mut()[part..(part + LANES).min(3 * K)];
-            if touched.has(lane) {
-                values.copy_from_slice(&row.store()[..values.len()]);
-            } else {
-                values.fill(0.0);
-            }
+            let row = if touched.has(lane) { *row } else { zero };
+            store_part(row, &mut out.as_flattened_mut()[part..]);
         }
     }
 }
@@ -113,12 +132,10 @@ pub(super) fn mean<L: Lanes>(
 ) -> [Wide<L>; 3] {
     let d = direction.unit;
     let along = along_basis(d, by_basis);
-    let dot = d[2].mul_add(along[2], d[1].mul_add(along[1], d[0] * along[0]));
-    let turned = each([0, 1, 2], |i| d[i].neg_mul_add(dot, along[i]) * direction.inverse_length);
+    let radial = dot(d, along);
+    let turned = each([0, 1, 2], |i| d[i].neg_mul_add(radial, along[i]) * direction.inverse_length);
     match frame {
-        Some(frame) => each(frame, |column| {
-            column[2].mul_add(turned[2], column[1].mul_add(turned[1], column[0] * turned[0]))
-        }),
+        Some([x, y, z]) => [dot(x, turned), dot(y, turned), dot(z, turned)],
         None => turned,
     }
 }
@@ -139,9 +156,6 @@ fn along_basis<L: Lanes>([x, y, z]: [Wide<L>; 3], e: &[Wide<L>; 16]) -> [Wide<L>
     let difference = n(3.0) * (xx - yy);
     let four_zz = n(4.0).mul_add(zz, -(xx + yy));
     let six_xy = n(6.0) * xy;
-    let sum = |terms: [Wide<L>; 8]| {
-        ((terms[0] + terms[1]) + (terms[2] + terms[3])) + ((terms[4] + terms[5]) + (terms[6] + terms[7]))
-    };
     [
         sum([
             e4 * y - e3,
@@ -174,4 +188,9 @@ fn along_basis<L: Lanes>([x, y, z]: [Wide<L>; 3], e: &[Wide<L>; 16]) -> [Wide<L>
             e14 * (xx - yy),
         ]),
     ]
+}
+
+#[inline(always)]
+fn sum<L: Lanes>(terms: [Wide<L>; 8]) -> Wide<L> {
+    ((terms[0] + terms[1]) + (terms[2] + terms[3])) + ((terms[4] + terms[5]) + (terms[6] + terms[7]))
 }

@@ -9,7 +9,7 @@ use super::colour;
 use super::lanes::{Kernel, Lanes};
 use super::preprocess::{Group, LANES};
 use super::project::View;
-use super::wide::{Wide, each};
+use super::wide::{Mask, Wide, each};
 use crate::scene::{Posed, PosedGradient};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
@@ -143,7 +143,7 @@ impl BackwardGaussians<'_, '_> {
             self.out.sh[sh].fill([0.0; 3]);
             return self.out.write(start, count, &gradient);
         }
-        let sums = Wide::transpose(&each(rows, |row| Wide::load(l, &row)));
+        let sums = Wide::load_transposed(l, &rows);
         let group = Group::load(self.posed, self.first + start, count);
         let load = |row: [f32; LANES]| Wide::load(l, &row);
         let source = Source {
@@ -202,14 +202,7 @@ impl<L: Lanes> SourceGradient<L> {
     /// Zeros where Gaussians were not touched; the radius where they were not visible.
     #[inline(always)]
     fn kept(&self, l: L, visible: u16, touched: u16) -> Self {
-        let mask = |bits: u16| {
-            let mut lanes = [0.0; LANES];
-            for (lane, value) in lanes.iter_mut().enumerate() {
-                *value = f32::from(bits >> lane & 1);
-            }
-            Wide::splat(l, 0.0).less(Wide::load(l, &lanes))
-        };
-        let (visible, touched) = (mask(visible), mask(touched));
+        let (visible, touched) = (mask(l, visible), mask(l, touched));
         Self {
             mean: each(self.mean, |v| touched.keep(v)),
             factor: each(self.factor, |column| each(column, |v| touched.keep(v))),
@@ -218,4 +211,14 @@ impl<L: Lanes> SourceGradient<L> {
             radius: visible.keep(self.radius),
         }
     }
+}
+
+/// One bit per lane.
+#[inline(always)]
+fn mask<L: Lanes>(l: L, bits: u16) -> Mask<L> {
+    let mut lanes = [0.0; LANES];
+    for (lane, value) in lanes.iter_mut().enumerate() {
+        *value = f32::from(bits >> lane & 1);
+    }
+    Wide::splat(l, 0.0).less(Wide::load(l, &lanes))
 }

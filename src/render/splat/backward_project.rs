@@ -5,7 +5,7 @@ use super::lanes::Lanes;
 use super::project::{
     LEAST_COMPENSATION, LOW_PASS, Projected, ScreenAxis, View, affine, dot, project, screen_axis,
 };
-use super::wide::{Wide, each};
+use super::wide::Wide;
 
 /// What the original adds to the squared determinant of the screen covariance on the way back.
 const DETERMINANT_GUARD: f32 = 1e-7;
@@ -45,8 +45,10 @@ impl<L: Lanes> Source<L> {
         let n = |value: f32| self.opacity.constant(value);
         let projected = project(view, self.mean, self.factor, self.opacity);
         let inverse_z = n(1.0) / projected.depth;
-        let axis = |k: usize| screen_axis(view, k, self.mean, self.factor, inverse_z);
-        let axes = [axis(0), axis(1)];
+        let axes = [
+            screen_axis(view, 0, self.mean, self.factor, inverse_z),
+            screen_axis(view, 1, self.mean, self.factor, inverse_z),
+        ];
 
         let [power, x, y, ..] = moments;
         let [a, b, c] = projected.conic;
@@ -63,17 +65,16 @@ impl<L: Lanes> Source<L> {
         // The covariance is the Gram matrix of the axes' factors.
         let [xx, xy, yy] = covariance;
         let [u, v] = [axes[0].factor, axes[1].factor];
-        let du = each([0, 1, 2], |j| (n(2.0) * xx).mul_add(u[j], xy * v[j]));
-        let dv = each([0, 1, 2], |j| (n(2.0) * yy).mul_add(v[j], xy * u[j]));
-        let factor =
-            each([0, 1, 2], |j| each([0, 1, 2], |i| axes[0].row[i].mul_add(du[j], axes[1].row[i] * dv[j])));
+        let du = combined(n(2.0) * xx, u, xy, v);
+        let dv = combined(n(2.0) * yy, v, xy, u);
+        let mut factor = self.factor;
+        for j in 0..3 {
+            factor[j] = combined(du[j], axes[0].row, dv[j], axes[1].row);
+        }
         let mut mean = [n(0.0); 3];
-        for (k, factor) in [du, dv].into_iter().enumerate() {
-            let by_row = each([0, 1, 2], |i| {
-                let [m0, m1, m2] = each(self.factor, |column| column[i]);
-                m2.mul_add(factor[2], m1.mul_add(factor[1], m0 * factor[0]))
-            });
-            self.add_jacobian(view, k, &axes[k], inverse_z, by_row, derivatives, &mut mean);
+        for (k, by_factor) in [du, dv].into_iter().enumerate() {
+            let row = transformed(self.factor, by_factor);
+            self.add_jacobian(view, k, &axes[k], inverse_z, row, derivatives, &mut mean);
             self.add_position(view, k, projected.depth, screen[k], &mut mean);
         }
         // α is the product of the opacity and what does not depend on it.
@@ -93,11 +94,7 @@ impl<L: Lanes> Source<L> {
         mean: &mut [Wide<L>; 3],
     ) {
         let n = |value: f32| inverse_z.constant(value);
-        let along = |k: usize| {
-            let [x, y, z, _] = view.rows[k];
-            row[2].mul_add(n(z), row[1].mul_add(n(y), row[0] * n(x)))
-        };
-        let (own, forward) = (along(k), along(2));
+        let (own, forward) = (along(view.rows[k], row), along(view.rows[2], row));
         let scale = n(view.focal[k]) * inverse_z * inverse_z;
         let limit = n(view.limit[k]);
         let free = axis.slope.at_least(-limit).and(limit.at_least(axis.slope));
@@ -179,4 +176,23 @@ fn compensation<L: Lanes>(
     let determinant = (x + w) * (y + w) - xy * xy;
     let scale = by_ratio * w / (determinant * determinant);
     [scale * y.mul_add(y + w, xy * xy), n(-2.0) * scale * xy * (x + y + w), scale * x.mul_add(x + w, xy * xy)]
+}
+
+/// `a u + b v`.
+#[inline(always)]
+fn combined<L: Lanes>(a: Wide<L>, u: [Wide<L>; 3], b: Wide<L>, v: [Wide<L>; 3]) -> [Wide<L>; 3] {
+    [a.mul_add(u[0], b * v[0]), a.mul_add(u[1], b * v[1]), a.mul_add(u[2], b * v[2])]
+}
+
+/// `M v`, M by columns.
+#[inline(always)]
+fn transformed<L: Lanes>([x, y, z]: [[Wide<L>; 3]; 3], v: [Wide<L>; 3]) -> [Wide<L>; 3] {
+    [dot([x[0], y[0], z[0]], v), dot([x[1], y[1], z[1]], v), dot([x[2], y[2], z[2]], v)]
+}
+
+/// The row's first three numbers times v.
+#[inline(always)]
+fn along<L: Lanes>([x, y, z, _]: [f32; 4], v: [Wide<L>; 3]) -> Wide<L> {
+    let n = |value: f32| v[0].constant(value);
+    v[2].mul_add(n(z), v[1].mul_add(n(y), v[0] * n(x)))
 }

@@ -147,8 +147,10 @@ pub(super) fn project<L: Lanes>(
     let number = |value: f32| opacity.constant(value);
     let z = affine(view.rows[2], mean);
     let inverse_z = number(1.0) / z;
-    let axis = |k: usize| screen_axis(view, k, mean, factor, inverse_z).factor;
-    let axes = [axis(0), axis(1)];
+    let axes = [
+        screen_axis(view, 0, mean, factor, inverse_z).factor,
+        screen_axis(view, 1, mean, factor, inverse_z).factor,
+    ];
     let (bare_xx, xy, bare_yy) = (dot(axes[0], axes[0]), dot(axes[0], axes[1]), dot(axes[1], axes[1]));
     let (xx, yy) = (bare_xx + number(LOW_PASS), bare_yy + number(LOW_PASS));
     let determinant = xx * yy - xy * xy;

@@ -29,8 +29,27 @@ impl<L: Lanes> Wide<L> {
     /// Lane j of row i becomes lane i of row j.
     #[inline(always)]
     pub(super) fn transpose(rows: &[Self; 16]) -> [Self; 16] {
-        let columns = rows[0].lanes.transpose(&each(*rows, |row| row.values));
-        each(columns, |values| rows[0].with(values))
+        let lanes = rows[0].lanes;
+        let mut values = [rows[0].values; 16];
+        for i in 1..16 {
+            values[i] = rows[i].values;
+        }
+        let columns = lanes.transpose(&values);
+        let mut out = *rows;
+        for i in 0..16 {
+            out[i].values = columns[i];
+        }
+        out
+    }
+
+    /// [`Wide::transpose`] of rows in memory.
+    #[inline(always)]
+    pub(super) fn load_transposed(lanes: L, rows: &[[f32; 16]; 16]) -> [Self; 16] {
+        let mut loaded = [Self::load(lanes, &rows[0]); 16];
+        for i in 1..16 {
+            loaded[i] = Self::load(lanes, &rows[i]);
+        }
+        Self::transpose(&loaded)
     }
 
     #[inline(always)]
@@ -145,7 +164,8 @@ impl<L: Lanes> Wide<L> {
     }
 }
 
-/// `values.map(f)`. (`map` is not always inlined, and then loses the vector instructions of its caller.)
+/// `values.map(f)`. (`map` is not always inlined, and then loses the vector instructions of its caller. So does `f` if it
+/// is more than a few operations: then it should be a function that is always inlined.)
 #[inline(always)]
 pub(super) fn each<const N: usize, T: Copy, U: Copy>(values: [T; N], mut f: impl FnMut(T) -> U) -> [U; N] {
     let mut out = [f(values[0]); N];
