@@ -6,6 +6,7 @@ mod data;
 mod exit;
 mod inspect;
 mod list;
+mod lpips;
 mod output;
 mod plan;
 mod planning;

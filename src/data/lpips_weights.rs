@@ -7,6 +7,7 @@ use super::{Error, error};
 use crate::metrics::lpips::{Network, NetworkSource};
 use crate::metrics::{LpipsNet, MetricsError};
 use safetensors::{Dtype, SafeTensors};
+use sha2::{Digest, Sha256};
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -22,18 +23,10 @@ pub fn embedded() -> &'static Network {
     &ALEX
 }
 
-/// Reads a network; which one it is shows from the shape of its first tensor. Other tensors in the file are ignored.
-///
-/// # Errors
-/// An unreadable or truncated file, a tensor that is missing, has another shape or type, or holds a value that is not
-/// finite.
-pub fn load(path: &Path) -> Result<Network, Error> {
-    from_bytes(path, &error::read_bytes(path, "LPIPS weights", EXPECTED)?)
-}
-
 const EXPECTED: &str = "a safetensors file with the weights of LPIPS";
 const FIRST: &str = "features.0.weight";
 
+/// Reads a network; which one it is shows from the shape of its first tensor. Other tensors in the file are ignored.
 fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Network, Error> {
     let file = SafeTensors::deserialize(bytes)
         .map_err(|cause| Error::invalid(path, "LPIPS weights", cause.to_string(), EXPECTED))?;
@@ -85,23 +78,41 @@ fn tensor(path: &Path, file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> R
 /// The networks at hand: AlexNet always, and the one that was read from a file, which goes before it.
 #[derive(Clone, Debug, Default)]
 pub struct Networks {
-    given: Option<Network>,
+    given: Option<Given>,
+}
+
+#[derive(Clone, Debug)]
+struct Given {
+    network: Network,
+    /// SHA-256 of the file.
+    digest: String,
 }
 
 impl Networks {
     /// Those at hand when this file, if there is one, has been read.
     ///
     /// # Errors
-    /// As [`load`].
+    /// An unreadable or truncated file, a tensor that is missing, has another shape or type, or holds a value that is
+    /// not finite.
     pub fn new(file: Option<&Path>) -> Result<Self, Error> {
-        Ok(Self { given: file.map(load).transpose()? })
+        let given = |path: &Path| {
+            let bytes = error::read_bytes(path, "LPIPS weights", EXPECTED)?;
+            let digest = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+            Ok(Given { network: from_bytes(path, &bytes)?, digest })
+        };
+        Ok(Self { given: file.map(given).transpose()? })
+    }
+
+    /// The network that was read from a file, if one was, and the file's SHA-256 in hexadecimal.
+    pub fn given(&self) -> Option<(LpipsNet, &str)> {
+        self.given.as_ref().map(|given| (given.network.net(), given.digest.as_str()))
     }
 }
 
 impl NetworkSource for Networks {
     fn network(&self, net: LpipsNet) -> Result<&Network, MetricsError> {
         match &self.given {
-            Some(given) if given.net() == net => Ok(given),
+            Some(given) if given.network.net() == net => Ok(&given.network),
             _ if net == LpipsNet::Alex => Ok(embedded()),
             _ => Err(MetricsError::NoWeights { net: net.id() }),
         }

@@ -237,7 +237,8 @@ fn add_block(block: &[f32], channel: usize, pixel: usize, values: &mut [f32], st
     }
 }
 
-/// Copies the values from `start` on of the patch of output pixel `at` into column `column`.
+/// Copies the values from `start` on of the patch of output pixel `at` into column `column`: row after row of the kernel,
+/// each of which lies in one piece in the input, but for what is beyond its borders.
 #[inline(always)]
 fn copy_patch(
     shape: &ConvolutionShape,
@@ -248,23 +249,28 @@ fn copy_patch(
     column: usize,
 ) {
     let ConvolutionShape { inputs, kernel, stride, padding, .. } = *shape;
-    let mut row = 0;
-    while row < patches.len() {
-        let (tap, channel) = ((start + row) / inputs, (start + row) % inputs);
-        let count = (inputs - channel).min(patches.len() - row);
-        let inside = |at: usize, tap: usize, size: usize| {
-            (at * stride + tap).checked_sub(padding).filter(|&position| position < size)
+    let (line, pad) = (input.width * inputs, padding * inputs);
+    let mut done = 0;
+    while done < patches.len() {
+        let (row, from) = ((start + done) / (kernel * inputs), (start + done) % (kernel * inputs));
+        let count = (kernel * inputs - from).min(patches.len() - done);
+        let patches = &mut patches[done..done + count];
+        done += count;
+        let y = (at.1 * stride + row).checked_sub(padding).filter(|&y| y < input.height);
+        // Where the row of the kernel begins in the line of the input, counted from the padding.
+        let begin = at.0 * stride * inputs + from;
+        let left = pad.saturating_sub(begin).min(count);
+        let right = (pad + line).saturating_sub(begin).clamp(left, count);
+        let inside = match y {
+            Some(y) if left < right => &input.values[y * line + begin + left - pad..][..right - left],
+            _ => &[],
         };
-        let (x, y) = (inside(at.0, tap % kernel, input.width), inside(at.1, tap / kernel, input.height));
-        let column = patches[row..row + count].iter_mut().map(|patch| &mut patch[column]);
-        match (x, y) {
-            (Some(x), Some(y)) => {
-                let source = &input.values[(y * input.width + x) * inputs + channel..][..count];
-                column.zip(source).for_each(|(value, source)| *value = *source);
-            }
-            _ => column.for_each(|value| *value = 0.0),
+        let left = if inside.is_empty() { count } else { left };
+        patches[..left].iter_mut().for_each(|patch| patch[column] = 0.0);
+        patches[left..].iter_mut().zip(inside).for_each(|(patch, value)| patch[column] = *value);
+        if left < count {
+            patches[right..].iter_mut().for_each(|patch| patch[column] = 0.0);
         }
-        row += count;
     }
 }
 
@@ -274,15 +280,35 @@ pub(super) fn max_pooled(input: &FeatureMap, size: usize, stride: usize) -> Feat
     let output = |side: usize| if side < size { 0 } else { (side - size) / stride + 1 };
     let (width, height, channels) = (output(input.width), output(input.height), input.channels);
     let mut pooled = FeatureMap::zeros(width, height, channels);
+    let arch = pulp::Arch::new();
     let rows = pooled.values.par_chunks_mut((width * channels).max(1)).enumerate();
-    rows.for_each(|(y, row)| {
-        for (x, values) in row.chunks_exact_mut(channels).enumerate() {
+    rows.for_each(|(y, row)| arch.dispatch(PooledRow { input, size, stride, y, row }));
+    pooled
+}
+
+/// One row of [`max_pooled`].
+struct PooledRow<'a> {
+    input: &'a FeatureMap,
+    size: usize,
+    stride: usize,
+    y: usize,
+    row: &'a mut [f32],
+}
+
+impl pulp::NullaryFnOnce for PooledRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { input, size, stride, y, row } = self;
+        for (x, values) in row.chunks_exact_mut(input.channels).enumerate() {
             values.copy_from_slice(input.at(x * stride, y * stride));
             for tap in 1..size * size {
                 let window = input.at(x * stride + tap % size, y * stride + tap / size);
-                values.iter_mut().zip(window).for_each(|(value, other)| *value = value.max(*other));
+                for (value, &other) in values.iter_mut().zip(window) {
+                    *value = if other > *value { other } else { *value };
+                }
             }
         }
-    });
-    pooled
+    }
 }
