@@ -123,7 +123,7 @@ impl Command {
             Self::List(command) => command.run(),
             Self::Render(command) => command.run(context),
             Self::Skin(command) => command.run(context),
-            Self::Score(command) => command.run(),
+            Self::Score(command) => command.run(context),
             Self::Blend(command) => command.run(),
             Self::Inspect(command) => command.run(),
             Self::Completions(command) => command.run(),

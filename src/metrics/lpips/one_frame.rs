@@ -14,9 +14,8 @@ pub trait NetworkSource: Sync {
     fn network(&self, net: LpipsNet) -> Result<&Network, MetricsError>;
 }
 
-/// Images whose features are kept: a truth and its renders under a few preparations. Features of a 512 x 512 image take
-/// 10 MB (AlexNet).
-const KEPT: usize = 4;
+/// Bytes of features that are kept; those of a 512 x 512 image take 13 MB (AlexNet) or 130 MB (VGG-16).
+const KEPT: usize = 192 << 20;
 
 /// The distances of several renders from one truth. Features of the images that were seen last are kept, so that those of
 /// the truth are computed once; values do not depend on it.
@@ -54,11 +53,18 @@ impl<'a> OneFrame<'a> {
         let features = network.features(&input);
         let seen = Arc::new(Seen { net: network.net(), input, features });
         let mut list = list();
-        if list.len() == KEPT {
+        list.push(seen.clone());
+        while list.iter().map(|seen| seen.bytes()).sum::<usize>() > KEPT {
             list.remove(0);
         }
-        list.push(seen.clone());
         seen
+    }
+}
+
+impl Seen {
+    fn bytes(&self) -> usize {
+        let maps = self.features.taps.iter().chain([&self.input]);
+        maps.map(|map| size_of_val(map.values.as_slice())).sum()
     }
 }
 
