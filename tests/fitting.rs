@@ -60,15 +60,16 @@ fn every_recipe_improves_on_its_start_on_held_out_poses() {
 fn an_interrupted_fit_ends_in_the_same_bits_on_any_number_of_threads() {
     let training = small(&subject().train[0], 4);
     for recipe in ["hugs-original", "splattingavatar-skinned", "ihuman-original"] {
-        let options = options(recipe, 24);
+        let options = options(recipe, 56);
         let first = start(&training, &options).unwrap();
         let whole = fitted(&training, &options);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let resumed = pool.install(|| {
             let mut trainer = Trainer::new(&training, &options, first.clone()).unwrap();
-            for _ in 0..13 {
+            for _ in 0..50 {
                 trainer.step().unwrap();
             }
+            assert!(trainer.is_resting());
             let bytes = postcard::to_stdvec(&trainer.checkpoint()).unwrap();
             let checkpoint = postcard::from_bytes(&bytes).unwrap();
             let mut trainer = Trainer::resume(&training, &options, checkpoint).unwrap();

@@ -7,6 +7,7 @@ mod exit;
 mod fit;
 mod inspect;
 mod list;
+mod lpips;
 mod output;
 mod plan;
 mod planning;
@@ -125,7 +126,7 @@ impl Command {
             Self::Fit(command) => command.run(context),
             Self::Render(command) => command.run(context),
             Self::Skin(command) => command.run(context),
-            Self::Score(command) => command.run(),
+            Self::Score(command) => command.run(context),
             Self::Blend(command) => command.run(),
             Self::Inspect(command) => command.run(),
             Self::Completions(command) => command.run(),

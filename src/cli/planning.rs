@@ -1,7 +1,9 @@
 //! Which experiments, on how much of the data: the arguments of `run` and `plan`.
 
 use super::data::Data;
-use crate::experiment::{self, Experiment, Options, Plan, Profile, Subset};
+use super::lpips::LpipsWeights;
+use crate::data::lpips_weights::Networks;
+use crate::experiment::{self, Experiment, GivenWeights, Options, Plan, Profile, Subset};
 use crate::run::Library;
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
@@ -31,6 +33,8 @@ pub(super) struct Planning {
     #[arg(long = "variant", value_name = "ID", help_heading = "Subset")]
     variants: Vec<String>,
     #[command(flatten)]
+    lpips: LpipsWeights,
+    #[command(flatten)]
     data: Data,
 }
 
@@ -42,6 +46,7 @@ pub(super) struct Planned {
     pub(super) plan: Plan,
     pub(super) experiments: Vec<Experiment>,
     pub(super) library: Library,
+    pub(super) networks: Networks,
 }
 
 impl Planning {
@@ -55,9 +60,12 @@ impl Planning {
             subjects: self.subjects.clone(),
             variants: self.variants.clone(),
         };
-        let options = Options { profile: self.profile.clone(), subset };
+        let networks = self.lpips.networks()?;
+        let given = |(net, digest): (_, &str)| GivenWeights { net, digest: digest.to_owned() };
+        let lpips_weights = networks.given().map(given);
+        let options = Options { profile: self.profile.clone(), subset, lpips_weights };
         let plan = experiment::plan(&experiments, &library.describe()?, &options)?;
-        Ok(Planned { plan, experiments, library })
+        Ok(Planned { plan, experiments, library, networks })
     }
 
     fn experiments(&self) -> Result<Vec<Experiment>> {

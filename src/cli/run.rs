@@ -71,13 +71,15 @@ impl Run {
     }
 
     /// Renders what is left to do; says how many frames that were.
-    fn execute(&self, Planned { plan, library, .. }: &Planned, context: Context) -> Result<usize> {
+    fn execute(&self, planned: &Planned, context: Context) -> Result<usize> {
+        let Planned { plan, library, networks, .. } = planned;
         let name = self.shard.map_or_else(|| FILE_NAME.to_owned(), Shard::file_name);
         let known = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
         let left = store::outstanding(plan.shard(self.shard), &known);
         let mut store = Store::open(&self.out.join(name), &plan.digest)?;
         let watch = Watch::new(context.quiet);
-        run::execute(plan, &left, library, &self.out.join(AVATARS), &mut store, &|event| watch.see(event))?;
+        let avatars = self.out.join(AVATARS);
+        run::execute(plan, &left, library, networks, &avatars, &mut store, &|event| watch.see(event))?;
         Ok(left.len())
     }
 

@@ -14,7 +14,7 @@ const IMAGE: &str = "a PNG, JPEG or .npy image";
 const MAX_EXPANSION: u64 = 1100;
 
 /// Loads an image, and its alpha channel if it has one. Colours are as stored: straight (un-premultiplied) sRGB values,
-/// 8-bit v / 255, 16-bit v / 65535; grey is repeated, palettes are looked up. An `.npy` image has shape (H, W, 3) or
+/// 8-bit v / 255, 16-bit v / 65535; grey is repeated, palettes are looked up, an Exif orientation is applied. An `.npy` image has shape (H, W, 3) or
 /// (H, W, 4) and is read as it is.
 ///
 /// # Errors
@@ -144,13 +144,15 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<Channels, Error> {
     limits.max_image_width = Some(MAX_IMAGE_SIDE);
     limits.max_image_height = Some(MAX_IMAGE_SIDE);
     reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(|e| broken(&e))?;
+    let mut decoder = reader.into_decoder().map_err(|e| broken(&e))?;
     let (width, height) = decoder.dimensions();
     if decoder.total_bytes() > (bytes.len() as u64).saturating_mul(MAX_EXPANSION) {
         let problem = format!("{width}x{height} pixels in {} bytes", bytes.len());
         return Err(Error::invalid(path, "image size", problem, "a size that the file can hold"));
     }
-    let image = DynamicImage::from_decoder(decoder).map_err(|e| broken(&e))?;
+    let orientation = decoder.orientation().map_err(|e| broken(&e))?;
+    let mut image = DynamicImage::from_decoder(decoder).map_err(|e| broken(&e))?;
+    image.apply_orientation(orientation);
     let count = usize::from(image.color().channel_count());
     let values = match &image {
         DynamicImage::ImageLuma8(i) => from_u8(i.as_raw()),
@@ -163,7 +165,7 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<Channels, Error> {
         DynamicImage::ImageRgba16(i) => from_u16(i.as_raw()),
         other => return Err(broken(&format!("pixel type {:?}", other.color()))),
     };
-    Ok(Channels { width: width as usize, height: height as usize, count, values })
+    Ok(Channels { width: image.width() as usize, height: image.height() as usize, count, values })
 }
 
 fn from_u8(values: &[u8]) -> Vec<f32> {

@@ -13,6 +13,7 @@
 //! | [`camera`] | camera JSON, `transforms.json`, `cameras.npz` |
 //! | [`frames`] | PNG, JPEG and `.npy` images and masks |
 //! | [`npy`], [`npz`] | NumPy arrays |
+//! | [`lpips_weights`] | safetensors with the networks of LPIPS |
 //! | [`folder`] | a subject as a folder of sequences |
 //! | [`peoplesnapshot`] | PeopleSnapshot as prepared for InstantAvatar |
 //! | [`registry`] | `datasets.toml` |
@@ -29,6 +30,7 @@ pub mod folder;
 pub mod frames;
 pub mod gltf;
 mod load;
+pub mod lpips_weights;
 pub mod npy;
 pub mod npz;
 pub mod peoplesnapshot;

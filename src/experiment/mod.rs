@@ -30,7 +30,7 @@ pub use error::Error;
 pub use key::{CodeVersions, canonical_json, content_key};
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
 pub use plan::{AvatarBuild, Job, JobVariant, Plan, PlannedFit, PlannedTable, plan};
-pub use profile::{Options, Profile, Subset, evenly_spaced};
+pub use profile::{GivenWeights, Options, Profile, Subset, evenly_spaced};
 pub use recipe::{FitOptions, RECIPES, Recipe};
 pub use record::{FrameRecord, Outcome, Records, Seconds};
 pub use rows::{DataRow, Source};

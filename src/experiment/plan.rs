@@ -5,7 +5,7 @@ use super::{
     AvatarRecipe, CodeVersions, Dataset, Error, Experiment, FitOptions, Options, Recipe, SequenceInfo, Shard,
     SubjectInfo, Variant, catalog, content_key,
 };
-use crate::metrics::{Protocol, ProtocolId};
+use crate::metrics::{MetricKind, Protocol, ProtocolId};
 use crate::strategy::Strategy;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -121,6 +121,8 @@ pub struct Job {
     pub resolution: Option<u32>,
     /// Whether the antialiased rasterizer renders.
     pub antialiased: bool,
+    /// Whether the table has a column for LPIPS.
+    pub lpips: bool,
     /// What is rendered.
     pub variants: Vec<JobVariant>,
 }
@@ -302,6 +304,8 @@ impl Builder<'_> {
     ) {
         let test = find_sequence(self.subject(row), &row.sequence).clone();
         let resolution = self.options.profile.resolution;
+        let lpips = experiment.columns.iter().any(|column| column.metric == MetricKind::Lpips);
+        let weights = self.options.lpips_weights.as_ref().filter(|given| given.net == protocol.lpips.net);
         let choices = Protocol { title: String::new(), source: String::new(), ..protocol.clone() };
         for &frame in &row.frames {
             let variants = variants.iter().map(|prepared| {
@@ -309,6 +313,7 @@ impl Builder<'_> {
                     "code": CodeVersions::CURRENT, "test": test.digest, "frame": frame,
                     "avatar": prepared.avatar, "strategy": prepared.strategy, "protocol": choices,
                     "antialiased": experiment.antialiased, "resolution": resolution,
+                    "lpips": lpips, "lpips_weights": weights.filter(|_| lpips),
                 });
                 JobVariant {
                     id: prepared.variant.id.clone(),
@@ -328,6 +333,7 @@ impl Builder<'_> {
                 protocol: protocol.id.clone(),
                 resolution,
                 antialiased: experiment.antialiased,
+                lpips,
                 variants: variants.collect(),
             });
         }

@@ -1,5 +1,6 @@
 //! How much of the data a run looks at.
 
+use crate::metrics::LpipsNet;
 use serde::{Deserialize, Serialize};
 
 /// A bound on frames and resolution. It is part of every key that it influences and of every caption.
@@ -102,6 +103,19 @@ pub struct Options {
     pub profile: Profile,
     /// A part of it.
     pub subset: Subset,
+    /// Weights of LPIPS that did not come with the program.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lpips_weights: Option<GivenWeights>,
+}
+
+/// Weights of an LPIPS network that were read from a file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GivenWeights {
+    /// The network.
+    pub net: LpipsNet,
+    /// SHA-256 of the file, in hexadecimal.
+    pub digest: String,
 }
 
 /// At most `limit` of `items`, evenly spaced: the items are cut into `limit` equal stretches and the middle of each is

@@ -100,7 +100,16 @@ mod tests {
     fn frame(protocol: &Protocol, pixels: u64, mse: f64, lpips: Option<f64>) -> FrameScore {
         let channel_mse = [mse; 3];
         let psnr = PsnrVariant::Image.psnr(channel_mse);
-        FrameScore { protocol: protocol.key(), pixels, channel_mse, mse, psnr, ssim: 1.0 - mse, lpips }
+        FrameScore {
+            protocol: protocol.key(),
+            pixels,
+            channel_mse,
+            mse,
+            psnr,
+            ssim: 1.0 - mse,
+            lpips,
+            lpips_missing: None,
+        }
     }
 
     #[test]

@@ -105,15 +105,26 @@ pub enum MetricsError {
         /// What was expected.
         expected: String,
     },
-    /// The LPIPS scorer failed.
-    #[error("lpips: {problem}")]
-    Lpips {
-        /// What it said.
-        problem: String,
+    /// The weights of an LPIPS network are not at hand.
+    #[error("lpips: no weights for {net}; expected --lpips-weights FILE with the {net} network")]
+    NoWeights {
+        /// Its name.
+        net: &'static str,
+    },
+    /// Regions that LPIPS has no meaning for.
+    #[error("lpips: region \"{region}\" is a set of pixels; expected one that is an image")]
+    NoImage {
+        /// The region.
+        region: &'static str,
     },
 }
 
 impl MetricsError {
+    /// Whether it only says that there can be no LPIPS, of images that are sound.
+    pub(crate) fn leaves_lpips_open(&self) -> bool {
+        matches!(self, Self::NoWeights { .. } | Self::NoImage { .. } | Self::TooSmall { .. })
+    }
+
     /// Checks a size against the render's.
     pub(crate) fn check_size(
         field: &'static str,

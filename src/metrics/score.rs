@@ -61,6 +61,9 @@ pub struct FrameScore {
     pub ssim: f64,
     /// LPIPS; `None` (`null`) means "not computed".
     pub lpips: Option<f64>,
+    /// Why a scorer that was there has not computed it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lpips_missing: Option<String>,
 }
 
 /// The two images as the metrics see them, after steps 1 to 3 of [`Protocol`].
@@ -84,11 +87,12 @@ impl Protocol {
         self.score_with(render, truth, None)
     }
 
-    /// As [`Protocol::score`]; LPIPS too if there is a scorer for it. LPIPS has no masked form: it stays `None` in
-    /// [`Region::Mask`].
+    /// As [`Protocol::score`]; LPIPS too if there is a scorer for it. It stays `None`, and the score says why, if there
+    /// are no weights for its network, if the image is too small for it, and in [`Region::Mask`], since LPIPS has no
+    /// masked form.
     ///
     /// # Errors
-    /// As [`Protocol::score`], and those of the scorer.
+    /// As [`Protocol::score`], and other errors of the scorer.
     pub fn score_with(
         &self,
         render: &Image,
@@ -99,9 +103,15 @@ impl Protocol {
         let sums = ErrorSums::new(&render, &truth, weights.as_deref())?;
         let ssim =
             ssim_of_planes(&render, &truth, &self.ssim.settings(), self.ssim.id(), weights.as_deref())?;
-        let lpips = match lpips {
-            Some(scorer) if weights.is_none() => Some(scorer.distance(&render, &truth, self.lpips)?),
-            _ => None,
+        let distance = lpips.map(|scorer| match weights {
+            None => scorer.distance(&render, &truth, self.lpips),
+            Some(_) => Err(MetricsError::NoImage { region: self.region.id() }),
+        });
+        let (lpips, lpips_missing) = match distance {
+            None => (None, None),
+            Some(Ok(distance)) => (Some(distance), None),
+            Some(Err(error)) if error.leaves_lpips_open() => (None, Some(error.to_string())),
+            Some(Err(error)) => return Err(error),
         };
         Ok(FrameScore {
             protocol: self.key(),
@@ -111,6 +121,7 @@ impl Protocol {
             psnr: self.psnr.psnr(sums.channel_mse()),
             ssim,
             lpips,
+            lpips_missing,
         })
     }
 

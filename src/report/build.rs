@@ -119,7 +119,10 @@ fn content(variant: &VariantResults, metric: MetricKind) -> Content {
 }
 
 fn not_computed(column: &Column) -> String {
-    format!("n/c: {} was not computed for every frame (it needs network weights)", column.title())
+    format!(
+        "n/c: {} was not computed for every frame (it needs the network's weights, and images of its minimum size)",
+        column.title()
+    )
 }
 
 /// `3 of 12 frames missing: a (error), b (not run), ...`.

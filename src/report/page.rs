@@ -33,13 +33,16 @@ pub fn page(results: &Results) -> String {
 
 /// The command that makes these tables again, from the same data.
 fn command(results: &Results) -> String {
-    let Options { profile, subset } = &results.options;
+    let Options { profile, subset, lpips_weights } = &results.options;
     let mut words = vec!["reproduce run".to_owned()];
     words.extend(results.tables.iter().map(|table| table.experiment.clone()));
     words.push(format!("--profile {}", profile.id));
     let variants = results.tables.iter().flat_map(|t| &t.sequences).flat_map(|sequence| &sequence.variants);
     if variants.map(|variant| &variant.id).any(|id| id.starts_with(ADDED_VARIANT)) {
         words.push("--all-strategies".to_owned());
+    }
+    if let Some(given) = lpips_weights {
+        words.push(format!("--lpips-weights lpips_{}.safetensors", given.net.id()));
     }
     if let Some([start, end]) = subset.frames {
         words.push(format!("--frames {start}..{end}"));

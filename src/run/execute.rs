@@ -7,7 +7,8 @@ use super::{Error, Library};
 use crate::data::Sequence;
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
 use crate::fit::train::Step;
-use crate::metrics::{self, Protocol};
+use crate::metrics::lpips::{NetworkSource, OneFrame};
+use crate::metrics::{self, PerceptualDistance, Protocol};
 use crate::render::splat::Renderer;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -40,6 +41,7 @@ pub fn execute(
     plan: &Plan,
     jobs: &[Job],
     library: &Library,
+    networks: &dyn NetworkSource,
     folder: &Path,
     store: &mut Store,
     watch: &(dyn Fn(Event) + Sync),
@@ -49,7 +51,7 @@ pub fn execute(
     watch(Event::Frames(jobs.len()));
     let store = Mutex::new(store);
     by_frame(jobs).par_iter().try_for_each_init(Renderer::new, |renderer, group| {
-        let records = run_frame(group, library, &avatars, renderer);
+        let records = run_frame(group, library, networks, &avatars, renderer);
         let mut store = store.lock().unwrap_or_else(PoisonError::into_inner);
         store.append(&records)?;
         group.iter().for_each(|_| watch(Event::FrameDone));
@@ -100,6 +102,7 @@ fn by_frame(jobs: &[Job]) -> Vec<Vec<&Job>> {
 fn run_frame(
     jobs: &[&Job],
     library: &Library,
+    networks: &dyn NetworkSource,
     avatars: &Avatars,
     renderer: &mut Renderer,
 ) -> Vec<FrameRecord> {
@@ -120,15 +123,17 @@ fn run_frame(
         Ok(frame) => frame,
         Err(error) => return failed(&error),
     };
+    let distances = OneFrame::new(networks);
     let mut records = Vec::new();
     for job in jobs {
         for variant in &job.variants {
             let mut seconds = Seconds::default();
-            let outcome =
-                match run_variant(job, variant, &frame, &avatars[&variant.avatar], renderer, &mut seconds) {
-                    Ok(outcome) => outcome,
-                    Err(error) => Outcome::Error(error.to_string()),
-                };
+            let avatar = &avatars[&variant.avatar];
+            let outcome = match run_variant(job, variant, &frame, avatar, &distances, renderer, &mut seconds)
+            {
+                Ok(outcome) => outcome,
+                Err(error) => Outcome::Error(error.to_string()),
+            };
             records.push(record(job, variant, outcome, seconds));
         }
     }
@@ -150,6 +155,7 @@ fn run_variant(
     variant: &JobVariant,
     frame: &Frame<'_>,
     avatar: &Built,
+    distances: &dyn PerceptualDistance,
     renderer: &mut Renderer,
     seconds: &mut Seconds,
 ) -> Result<Outcome, Error> {
@@ -158,7 +164,7 @@ fn run_variant(
     let drawn = frame.draw(job, variant, avatar, renderer, seconds)?;
     let start = Instant::now();
     let truth = metrics::Truth::Straight { rgb: &frame.truth.rgb, alpha: &frame.truth.alpha };
-    let score = protocol.score(&drawn.image, truth)?;
+    let score = protocol.score_with(&drawn.image, truth, job.lpips.then_some(distances))?;
     seconds.score = start.elapsed().as_secs_f64();
     Ok(Outcome::Scored { score, splats: drawn.splats, visible_splats: drawn.visible_splats })
 }

@@ -92,7 +92,7 @@ pub enum FitEvent<'a> {
 ///
 /// # Errors
 /// Training frames that cannot be used, a fit that diverges (the last checkpoint stays), files that cannot be written.
-/// `watch` may stop the fit with an error of its own; the checkpoint of that moment stays.
+/// `watch` may stop the fit with an error of its own; the last checkpoint stays.
 pub fn fit(
     sequence: &Sequence,
     options: &FitOptions,
@@ -117,12 +117,11 @@ pub fn fit(
             progress.note_warning(warning);
         }
         progress.note(step);
-        let stop = watch(FitEvent::Step(step, trainer.avatar()));
-        if stop.is_err() || saved.elapsed() > BETWEEN_CHECKPOINTS {
+        watch(FitEvent::Step(step, trainer.avatar()))?;
+        if trainer.is_resting() && saved.elapsed() > BETWEEN_CHECKPOINTS {
             progress.save(&path, trainer.checkpoint())?;
             saved = Instant::now();
         }
-        stop?;
     }
     let report = FitReport {
         schema: SCHEMA,

@@ -21,7 +21,7 @@ pub(super) fn wide_table_7() -> Experiment {
 }
 
 pub(super) fn options() -> Options {
-    Options { profile: Profile::standard(), subset: Subset::default() }
+    Options { profile: Profile::standard(), subset: Subset::default(), lpips_weights: None }
 }
 
 pub(super) fn sequence(id: &str, role: Role, frames: usize) -> SequenceInfo {
@@ -74,6 +74,7 @@ pub(super) fn score(protocol: &str, psnr: f64, ssim: f64, lpips: Option<f64>) ->
         psnr,
         ssim,
         lpips,
+        lpips_missing: None,
     }
 }
 

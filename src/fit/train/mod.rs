@@ -32,6 +32,9 @@ use frames::TrainingFrames;
 use parameters::{Parameters, RatesNow};
 use serde::{Deserialize, Serialize};
 
+/// Iterations between two bindings of the avatar to its body.
+const BETWEEN_BINDINGS: u32 = 50;
+
 /// What an iteration did.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Step {
@@ -157,6 +160,12 @@ impl<'a> Trainer<'a> {
         self.iteration >= self.options.iterations
     }
 
+    /// True before every fiftieth iteration, when the avatar is bound anew: Gaussians that have moved meet other faces and
+    /// skinning weights. Only a checkpoint of such a moment continues in the same bits.
+    pub fn is_resting(&self) -> bool {
+        self.iteration.is_multiple_of(BETWEEN_BINDINGS)
+    }
+
     /// The avatar as it stands.
     pub fn avatar(&self) -> &Avatar {
         &self.parameters.avatar
@@ -167,7 +176,7 @@ impl<'a> Trainer<'a> {
         std::mem::take(&mut self.warnings)
     }
 
-    /// Everything that a later [`Trainer::resume`] needs.
+    /// Everything that a later [`Trainer::resume`] needs, at a moment that [`Trainer::is_resting`].
     pub fn checkpoint(&self) -> Checkpoint {
         Checkpoint::new(
             self.sequence,
@@ -186,7 +195,11 @@ impl<'a> Trainer<'a> {
         let (recipe, iterations) = (&self.options.recipe, self.options.iterations);
         self.parameters.raise_sh_degree(recipe.sh_degree_at(self.iteration, iterations));
         let in_strategy = Error::strategy(self.sequence);
-        self.bound.update(&self.parameters.avatar).map_err(&in_strategy)?;
+        if self.is_resting() {
+            self.bound = BoundAvatar::new(&self.parameters.avatar, &self.sequence.body).map_err(&in_strategy)?;
+        } else {
+            self.bound.update(&self.parameters.avatar).map_err(&in_strategy)?;
+        }
         let frame = self.frames.of_iteration(self.iteration as usize, &mut self.warnings)?;
         let body = PosedBody::new(&self.sequence.body, frame.pose).map_err(Error::scene(self.sequence))?;
         let posed = pose(&self.bound, &body, &self.strategy).map_err(&in_strategy)?;

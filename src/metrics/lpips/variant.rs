@@ -1,6 +1,8 @@
-//! The LPIPS variants by name, and the interface through which a scorer fills [`super::FrameScore::lpips`].
+//! The LPIPS variants by name, and the interface through which a scorer fills [`FrameScore::lpips`].
+//!
+//! [`FrameScore::lpips`]: crate::metrics::FrameScore::lpips
 
-use super::{MetricsError, Planes};
+use crate::metrics::{MetricsError, Planes};
 use serde::{Deserialize, Serialize};
 
 /// Backbone of LPIPS 0.1.
@@ -22,6 +24,19 @@ pub enum InputRange {
     /// v itself: the slip of 3DGS's `metrics.py`, HUGS, iHuman, Animatable 3D Gaussians and HAHA. Values are about half
     /// as large; the two families must not be compared.
     Raw01,
+}
+
+impl LpipsNet {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Alex, Self::Vgg];
+
+    /// Stable name.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Alex => "alex",
+            Self::Vgg => "vgg",
+        }
+    }
 }
 
 /// A variant of LPIPS, written `alex-pm1`, `vgg-raw01`, ...
@@ -52,6 +67,16 @@ impl LpipsVariant {
             (LpipsNet::Vgg, InputRange::Raw01) => "vgg-raw01",
         }
     }
+
+    /// Its name among other metrics.
+    pub fn metric(self) -> &'static str {
+        match (self.net, self.range) {
+            (LpipsNet::Alex, InputRange::Pm1) => "lpips_alex_pm1",
+            (LpipsNet::Alex, InputRange::Raw01) => "lpips_alex_raw01",
+            (LpipsNet::Vgg, InputRange::Pm1) => "lpips_vgg_pm1",
+            (LpipsNet::Vgg, InputRange::Raw01) => "lpips_vgg_raw01",
+        }
+    }
 }
 
 impl TryFrom<String> for LpipsVariant {
@@ -69,7 +94,7 @@ impl From<LpipsVariant> for String {
     }
 }
 
-/// Something that computes LPIPS; handed to [`super::Protocol::score_with`].
+/// Something that computes LPIPS; handed to [`crate::metrics::Protocol::score_with`].
 pub trait PerceptualDistance: Sync {
     /// The distance of two images of equal size, prepared by the protocol (composited, clamped, quantised, cropped);
     /// values are colours in \[0, 1\], the variant's input range is applied by the scorer.

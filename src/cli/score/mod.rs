@@ -1,0 +1,232 @@
+//! `reproduce score`: two images, or two folders of frames, by every metric variant, under one protocol or under all.
+
+mod all;
+mod pairs;
+
+use super::lpips::LpipsWeights;
+use super::output::{Format, emit, emit_json};
+use super::selection::parse_colour;
+use super::{Context, Exit};
+use crate::data::lpips_weights::Networks;
+use crate::metrics::lpips::OneFrame;
+use crate::metrics::{
+    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Summary, Truth, all_variants,
+};
+use crate::scene::Image;
+use anyhow::{Context as _, Result};
+use pairs::Pair;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Score renders against truth: two images, or two folders whose frames pair up by name.
+///
+/// Prints every variant of PSNR and SSIM by its name; with a mask also those of the masked pixels (`_mask`), of the mask's
+/// bounding box (`_bbox`) and of images multiplied by the mask (`_image_times_mask`). --lpips adds LPIPS, and --protocol
+/// the scores of a paper's own evaluation, LPIPS included; `--protocol all` prints a table with the scores under every
+/// protocol instead, which shows how much the protocol alone moves them.
+///
+/// An alpha channel of the truth is its mask, unless --mask names another, and is composited over the background. In JSON,
+/// `null` stands for an infinite PSNR (identical images); a variant that cannot be computed is listed under "not_computed"
+/// with the reason.
+///
+/// Images are PNG (grey, grey with alpha, RGB, RGBA, palettes; 1 to 16 bits, as v / 65535), JPEG (turned as their Exif
+/// orientation says) or .npy arrays (H, W, 3 or 4); render, truth and mask must have one size. Masks are grey.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Score {
+    /// Rendered image, or folder of frames
+    render: PathBuf,
+    /// True image, or folder of frames
+    truth: PathBuf,
+    /// Mask of the subject, or folder of masks
+    #[arg(long, value_name = "M")]
+    mask: Option<PathBuf>,
+    /// Score under this protocol too: a preset, or a preset with changed choices (see `reproduce list protocols`); `all`
+    /// for a table of every preset
+    #[arg(long, value_name = "P")]
+    protocol: Option<String>,
+    /// Also every variant of LPIPS of the whole image
+    #[arg(long)]
+    lpips: bool,
+    #[command(flatten)]
+    weights: LpipsWeights,
+    /// Background for images with alpha [default: the protocol's, else white]
+    #[arg(long, value_name = "R,G,B", value_parser = parse_colour)]
+    background: Option<[f32; 3]>,
+    /// How to print the scores
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce score render.png truth.png --lpips           every variant of every metric
+  reproduce score RENDERS TRUTHS --protocol hugs-human   as HUGS evaluates
+  reproduce score RENDERS TRUTHS --protocol all          as each of the papers evaluates";
+
+/// The scores of one frame.
+#[derive(Serialize)]
+struct Scored {
+    #[serde(skip)]
+    name: String,
+    #[serde(flatten)]
+    variants: Map<String, Value>,
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    not_computed: Map<String, Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    protocol: Option<FrameScore>,
+    #[serde(skip)]
+    over_another_background: bool,
+}
+
+impl Score {
+    pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        let folders = self.truth.is_dir();
+        let pairs = if folders { pairs::folders } else { pairs::single };
+        let pairs = || pairs(&self.render, &self.truth, self.mask.as_deref());
+        if self.protocol.as_deref() == Some(all::ID) {
+            all::run(self, &pairs()?, context)?;
+            return Ok(Exit::Success);
+        }
+        let protocol = self.protocol.as_deref().map(Protocol::parse).transpose()?;
+        let networks = self.weights.networks()?;
+        let score = |pair: &Pair| self.score(pair, protocol.as_ref(), &networks);
+        let scored = pairs::each(&pairs()?, context, score)?;
+        warn_of_backgrounds(&scored, context);
+        match (folders, self.format) {
+            (false, Format::Json) => emit_json(&scored[0])?,
+            (false, Format::Text) => emit(&scored[0].text())?,
+            (true, format) => emit_folder(&scored, protocol.as_ref(), format)?,
+        }
+        Ok(Exit::Success)
+    }
+
+    /// What images with alpha are composited over.
+    fn background(&self, protocol: Option<&Protocol>) -> [f32; 3] {
+        self.background.or(protocol.and_then(Protocol::background_colour)).unwrap_or([1.0; 3])
+    }
+
+    fn score(&self, pair: &Pair, protocol: Option<&Protocol>, networks: &Networks) -> Result<Scored> {
+        let background = self.background(protocol);
+        let loaded = pair.load()?;
+        let (render, truth) = loaded.over(background)?;
+        let mask = loaded.mask();
+        let distances = OneFrame::new(networks);
+        let context = || pair.files();
+        let mut values = all_variants(&render, &truth, mask).with_context(context)?;
+        if self.lpips {
+            values.extend(lpips_variants(&render, &truth, &distances).with_context(context)?);
+        }
+        let (mut variants, mut not_computed) = (Map::new(), Map::new());
+        for (id, value) in values {
+            match value {
+                Ok(value) => variants.insert(id.to_owned(), number(value)),
+                Err(reason) => not_computed.insert(id.to_owned(), json!(reason.to_string())),
+            };
+        }
+        let truth = Truth::Composited { rgb: &truth, mask };
+        let protocol = protocol.map(|p| p.score_with(&render, truth, Some(&distances))).transpose();
+        let protocol = protocol.with_context(context)?;
+        let over_another_background = loaded.lies_over_another(background);
+        Ok(Scored { name: pair.name.clone(), variants, not_computed, protocol, over_another_background })
+    }
+}
+
+/// All variants of LPIPS of two images.
+fn lpips_variants(
+    render: &Image,
+    truth: &Image,
+    distances: &OneFrame<'_>,
+) -> Result<Vec<crate::metrics::variants::VariantScore>> {
+    let (render, truth) = (Planes::new(render, "render")?, Planes::new(truth, "truth")?);
+    let value = |variant: LpipsVariant| (variant.metric(), distances.distance(&render, &truth, variant));
+    Ok(LpipsVariant::ALL.map(value).into())
+}
+
+fn warn_of_backgrounds(scored: &[Scored], context: Context) {
+    let mut others = scored.iter().filter(|frame| frame.over_another_background);
+    if let Some(first) = others.next() {
+        context.note(format!(
+            "warning: the background of {} of {} renders ({}) is not the one under the truth; --background R,G,B \
+             changes the latter",
+            1 + others.count(),
+            scored.len(),
+            first.name
+        ));
+    }
+}
+
+fn emit_folder(scored: &[Scored], protocol: Option<&Protocol>, format: Format) -> Result<()> {
+    let mean = means(scored);
+    let scores: Option<Vec<FrameScore>> = scored.iter().map(|frame| frame.protocol.clone()).collect();
+    let summary = match (protocol, scores) {
+        (Some(protocol), Some(scores)) => Some(protocol.aggregate(&scores)?),
+        _ => None,
+    };
+    if format == Format::Json {
+        let frames: BTreeMap<&str, &Scored> = scored.iter().map(|f| (f.name.as_str(), f)).collect();
+        return emit_json(&json!({ "frames": frames, "mean": mean, "protocol": summary }));
+    }
+    let missing = scored.iter().find_map(|frame| frame.protocol.as_ref()?.lpips_missing.as_deref());
+    let mean = Scored {
+        name: format!("mean of {} frames", scored.len()),
+        variants: mean,
+        not_computed: Map::new(),
+        protocol: None,
+        over_another_background: false,
+    };
+    emit(&(scored.iter().map(Scored::text).collect::<String>() + &mean.text()))?;
+    if let Some(Summary { protocol, psnr, ssim, lpips, .. }) = &summary {
+        emit(&protocol_line(protocol, *psnr, *ssim, *lpips, missing))?;
+    }
+    Ok(())
+}
+
+fn protocol_line(
+    protocol: &impl std::fmt::Display,
+    psnr: f64,
+    ssim: f64,
+    lpips: Option<f64>,
+    missing: Option<&str>,
+) -> String {
+    let missing = missing.unwrap_or("no reason given");
+    let lpips = lpips.map_or_else(|| format!("not computed ({missing})"), |value| format!("{value:.6}"));
+    format!("protocol {protocol}: psnr {psnr:.6}  ssim {ssim:.6}  lpips {lpips}\n")
+}
+
+impl Scored {
+    fn text(&self) -> String {
+        let mut text = format!("{}\n", self.name);
+        for (id, value) in &self.variants {
+            let value = value.as_f64().map_or("inf".to_owned(), |v| format!("{v:.6}"));
+            text += &format!("  {id:36} {value}\n");
+        }
+        for (id, reason) in &self.not_computed {
+            text += &format!("  {id:36} not computed: {}\n", reason.as_str().unwrap_or_default());
+        }
+        if let Some(FrameScore { protocol, psnr, ssim, lpips, lpips_missing, .. }) = &self.protocol {
+            text += "  ";
+            text += &protocol_line(protocol, *psnr, *ssim, *lpips, lpips_missing.as_deref());
+        }
+        text
+    }
+}
+
+/// Means over the frames, in their order; only of variants that every frame has. One infinite PSNR makes its mean
+/// infinite.
+fn means(scored: &[Scored]) -> Map<String, Value> {
+    let Some(first) = scored.first() else { return Map::new() };
+    let mean = |id: &String| {
+        let values: Option<Vec<&Value>> = scored.iter().map(|frame| frame.variants.get(id)).collect();
+        let sum: f64 = values?.iter().map(|v| v.as_f64().unwrap_or(f64::INFINITY)).sum();
+        Some((id.clone(), number(sum / scored.len() as f64)))
+    };
+    first.variants.keys().filter_map(mean).collect()
+}
+
+/// JSON has no infinity: `null`.
+fn number(value: f64) -> Value {
+    serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
+}
