@@ -40,14 +40,20 @@ fn shape(gaussians: &Gaussians, gradient: &PosedGradient) -> (Vec<f32>, Vec<f32>
     (log_scales, quaternions)
 }
 
-/// |found - expected| / |expected|.
-fn relative(found: &[f32], expected: &[f32]) -> f64 {
+/// |found - expected| / |expected| of all Gaussians, and of all but the hundredth that differs most.
+fn relative(found: &[f32], expected: &[f32], count: usize) -> [f64; 2] {
     assert_eq!(found.len(), expected.len());
-    let square = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>();
-    let differences = &mut found.iter().zip(expected).map(|(a, b)| f64::from(*a) - f64::from(*b));
-    (square(differences) / square(&mut expected.iter().map(|&v| f64::from(v)))).sqrt()
+    let width = found.len() / count;
+    let difference = |(a, b): (&f32, &f32)| (f64::from(*a) - f64::from(*b)).powi(2);
+    let rows = found.chunks(width).zip(expected.chunks(width));
+    let mut squares: Vec<f64> = rows.map(|(a, b)| a.iter().zip(b).map(difference).sum()).collect();
+    squares.sort_unstable_by(f64::total_cmp);
+    let norm: f64 = expected.iter().map(|&v| f64::from(v).powi(2)).sum();
+    [count, count - count / 100].map(|n| (squares[..n].iter().sum::<f64>() / norm).sqrt())
 }
 
+/// Where alpha is about 1/255 or the transmittance about 1e-4, rounding decides whether a splat is blended at a pixel: that
+/// is all of the difference, at a few Gaussians.
 #[test]
 fn scene_s_has_the_derivatives_of_the_original_kernels() {
     let (camera, background) = splat_scene::camera(&json("raster/front_512.json"));
@@ -75,16 +81,18 @@ fn scene_s_has_the_derivatives_of_the_original_kernels() {
     let flat = |values: &[Vec3]| values.iter().flat_map(|v| v.to_array()).collect::<Vec<f32>>();
     let screen: Vec<f32> = gradient.screen.iter().flat_map(|&[x, y]| [x, y, 0.0]).collect();
     let found = [
-        ("xyz", flat(&gradient.means), 1e-3),
-        ("sh", gradient.sh.as_flattened().to_vec(), 1e-3),
-        ("logit", logits, 1e-3),
-        ("logscale", log_scales, 1e-3),
-        ("rawquat", quaternions, 1e-3),
-        ("mean2d", screen, 1e-3),
+        ("xyz", flat(&gradient.means), 3e-4),
+        ("sh", gradient.sh.as_flattened().to_vec(), 1.5e-4),
+        ("logit", logits, 2e-4),
+        ("logscale", log_scales, 4e-4),
+        ("rawquat", quaternions, 2e-4),
+        ("mean2d", screen, 3e-4),
     ];
     for (name, found, tolerance) in found {
-        let error = relative(&found, &array("raster/S_front_512_grads.npz", name));
-        println!("{name}: {error:.1e} of the norm");
-        assert!(error <= tolerance, "{name}: {error:e}");
+        let expected = array("raster/S_front_512_grads.npz", name);
+        let [all, most] = relative(&found, &expected, gaussians.len());
+        println!("{name}: {all:.1e} of the norm, {most:.1e} without the worst hundredth");
+        assert!(all <= tolerance, "{name}: {all:e}");
+        assert!(most <= 1.5e-5, "{name}: {most:e} without the worst hundredth");
     }
 }

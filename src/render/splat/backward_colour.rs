@@ -17,9 +17,9 @@ impl Touched {
     }
 }
 
-/// Derivatives with respect to the SH coefficients of sixteen Gaussians, which are written to `out`, and (returned) with
-/// respect to the values of the basis functions, of which Gaussians that were not touched have zeros. `rgb` are those
-/// with respect to the clamped colour.
+/// Derivatives with respect to the SH coefficients of sixteen Gaussians, which are written to `out` (zeros for those that
+/// were not touched), and (returned) with respect to the values of the basis functions (anything for those). `rgb` are
+/// the derivatives with respect to the clamped colour.
 #[inline(always)]
 pub(super) fn coefficients<const K: usize, L: Lanes>(
     l: L,
@@ -30,7 +30,7 @@ pub(super) fn coefficients<const K: usize, L: Lanes>(
     touched: Touched,
     out: &mut [[f32; 3]],
 ) -> [Wide<L>; 16] {
-    let sh = by_coefficient::<K, L>(l, sh, touched);
+    let sh = by_coefficient::<K, L>(l, sh);
     let colour = unclamped::<K, L>(&sh, basis);
     let n = |value: f32| Wide::splat(l, value);
     let mut free = rgb;
@@ -67,18 +67,19 @@ fn unclamped<const K: usize, L: Lanes>(sh: &[Wide<L>; 48], basis: &[Wide<L>; 16]
     colour
 }
 
-/// The touched Gaussians' coefficients, one per vector; zeros for the others, and beyond the degree.
+/// The Gaussians' coefficients, one per vector; zeros beyond the degree.
 #[inline(always)]
-fn by_coefficient<const K: usize, L: Lanes>(l: L, sh: &[[f32; 3]], touched: Touched) -> [Wide<L>; 48] {
-    let mut out = [Wide::splat(l, 0.0); 48];
-    for part in (0..3 * K).step_by(LANES) {
-        let mut rows = [Wide::splat(l, 0.0); LANES];
-        for (lane, (row, sh)) in rows.iter_mut().zip(sh.chunks_exact(K)).enumerate() {
-            if touched.has(lane) {
-                *row = load_part(l, &sh.as_flattened()[part..]);
-            }
+fn by_coefficient<const K: usize, L: Lanes>(l: L, sh: &[[f32; 3]]) -> [Wide<L>; 48] {
+    // In the order of memory, and also of Gaussians that were not touched: whatever else makes the processor wait.
+    let mut rows = [[Wide::splat(l, 0.0); LANES]; 3];
+    for (lane, sh) in sh.chunks_exact(K).enumerate() {
+        for part in 0..(3 * K).div_ceil(LANES) {
+            rows[part][lane] = load_part(l, &sh.as_flattened()[part * LANES..]);
         }
-        out[part..part + LANES].copy_from_slice(&Wide::transpose(&rows));
+    }
+    let mut out = [rows[0][0]; 48];
+    for part in 0..(3 * K).div_ceil(LANES) {
+        out[part * LANES..][..LANES].copy_from_slice(&Wide::transpose(&rows[part]));
     }
     out
 }
@@ -112,13 +113,16 @@ fn store_coefficients<const K: usize, L: Lanes>(
     out: &mut [[f32; 3]],
 ) {
     let zero = gradient[0].constant(0.0);
-    for part in (0..3 * K).step_by(LANES) {
+    let mut rows = [[zero; LANES]; 3];
+    for part in 0..(3 * K).div_ceil(LANES) {
         let mut columns = [zero; LANES];
-        columns.copy_from_slice(&gradient[part..part + LANES]);
-        let rows = Wide::transpose(&columns);
-        for (lane, (row, out)) in rows.iter().zip(out.chunks_exact_mut(K)).enumerate() {
-            let row = if touched.has(lane) { *row } else { zero };
-            store_part(row, &mut out.as_flattened_mut()[part..]);
+        columns.copy_from_slice(&gradient[part * LANES..][..LANES]);
+        rows[part] = Wide::transpose(&columns);
+    }
+    for (lane, out) in out.chunks_exact_mut(K).enumerate() {
+        for part in 0..(3 * K).div_ceil(LANES) {
+            let row = if touched.has(lane) { rows[part][lane] } else { zero };
+            store_part(row, &mut out.as_flattened_mut()[part * LANES..]);
         }
     }
 }

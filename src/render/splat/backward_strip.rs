@@ -70,8 +70,8 @@ impl Scratch {
     fn prepare(&mut self, segments: usize) {
         self.open.clear();
         self.open.resize(segments * BLOCKS, [1.0; 16]);
-        self.upstream.clear();
         self.upstream.resize(BLOCKS, None);
+        self.upstream.iter_mut().for_each(|block| *block = None);
     }
 }
 

@@ -7,7 +7,8 @@
 //! A pixel is visited only for splats whose ellipse of alpha = 1/255 comes within 4x4 pixels of it, and the result is the
 //! same as visiting them all.
 //!
-//! The image has the same bits for any number of threads and any vector width.
+//! The image has the same bits for any number of threads and any vector width. So have the derivatives that
+//! [`Renderer::backward`] takes back from the pixels to the Gaussians (`backward` and the modules named after it).
 //!
 //! # Where it departs from the original, on purpose
 //! - Principal points may be anywhere; the Jacobian's limit stays `1.3 size / (2 focal)` on both sides of the axis.
