@@ -5,13 +5,18 @@
 //! frame (`sighting`), and what explains best what was seen there (`gather`). Frames are loaded a few at a time, in
 //! order; within a frame every point is independent: the avatar has the same bits for any number of threads.
 
+pub(crate) mod adam;
 pub mod clothing;
 mod disc;
 mod error;
 mod fill;
+mod frame_order;
 mod gather;
 mod room;
+pub mod shape;
 mod sighting;
+mod silhouette;
+pub mod subdivide;
 pub mod surface;
 mod tessellation;
 pub mod texture;
