@@ -25,7 +25,8 @@ use std::sync::Arc;
 use surface::Surface;
 use views::{Cache, View};
 
-/// How a shape is fitted.
+/// How a shape is fitted. The defaults were chosen on a clothed subject, by the overlap with held-out masks; they move a
+/// naked one by a fraction of a pixel. 400 iterations gain another 0.0002 of intersection over union.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ShapeFit {
@@ -35,6 +36,9 @@ pub struct ShapeFit {
     pub batch: usize,
     /// Adam's step at the start, metres; falls to zero along a half cosine.
     pub learning_rate: f64,
+    /// Adam's epsilon, in units of the objective per metre: vertices that hardly matter to it hardly move. With a smaller
+    /// one, those that no outline visits follow the last digits of the regularisers at full pace.
+    pub epsilon: f64,
     /// Weight of one minus the intersection over union.
     pub iou: f64,
     /// Weight of the variance of edge lengths relative to the rest mesh.
@@ -58,17 +62,18 @@ pub struct ShapeFit {
 impl Default for ShapeFit {
     fn default() -> Self {
         Self {
-            iterations: 1000,
+            iterations: 150,
             batch: 4,
-            learning_rate: 5e-4,
+            learning_rate: 1e-3,
+            epsilon: 1e-4,
             iou: 1.0,
-            edge_length: 0.1,
-            normal_consistency: 0.1,
-            laplacian: 0.1,
+            edge_length: 1e-3,
+            normal_consistency: 2e-3,
+            laplacian: 5e-3,
             smoothing: 8,
             softness: 1.0,
             longest_side: 512,
-            outline_rounds: 0,
+            outline_rounds: 2,
             seed: 0,
         }
     }
@@ -139,6 +144,7 @@ impl ShapeFit {
     fn validate(&self) -> Result<(), Error> {
         let weights = [
             ("learning_rate", self.learning_rate),
+            ("epsilon", self.epsilon),
             ("iou", self.iou),
             ("edge_length", self.edge_length),
             ("normal_consistency", self.normal_consistency),
@@ -215,6 +221,7 @@ impl<'a> Fit<'a> {
         let weights = self.settings.weights();
         let mut parameters = vec![0.0f32; self.start.len()];
         let mut adam = Adam::new(parameters.len());
+        adam.epsilon = self.settings.epsilon;
         let mut curve = Vec::with_capacity(self.settings.iterations);
         let mut ended = Ended::Finished;
         let mut offsets = self.offsets(&diffusion, &parameters);

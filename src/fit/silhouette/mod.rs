@@ -71,7 +71,7 @@ pub(super) fn compare(
     mask: &[f32],
     blur: &Blur,
 ) -> Match {
-    let coverage = Coverage::of(points, topology.faces(), window);
+    let coverage = Coverage::of(points, topology, window);
     let mut soft = coverage.fractions();
     blur.apply(&mut soft, window.width);
     let (iou, mut gradient) = overlap::overlap(&soft, mask);
@@ -82,6 +82,6 @@ pub(super) fn compare(
 
 /// How much of a mask the silhouette of projected vertices covers, pixels. Arguments as [`compare`].
 pub(super) fn common_area(topology: &Topology, points: &[DVec2], window: Window, mask: &[f32]) -> f64 {
-    let coverage = Coverage::of(points, topology.faces(), window).fractions();
+    let coverage = Coverage::of(points, topology, window).fractions();
     coverage.iter().zip(mask).map(|(c, &m)| c * f64::from(m)).sum()
 }

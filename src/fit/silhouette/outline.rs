@@ -202,7 +202,7 @@ mod tests {
         let loss =
             |points: &[DVec2]| -> f64 { exact(points, &[]).iter().zip(&weights).map(|(c, w)| c * w).sum() };
         let topology = Topology::new(&faces);
-        let coverage = Coverage::of(&points, &faces, WINDOW);
+        let coverage = Coverage::of(&points, &topology, WINDOW);
         let found = pulled_back(&topology, &points, &coverage, &weights);
         for (i, (found, expected)) in found.iter().zip(differences(&points, loss)).enumerate() {
             // the coverage is piecewise quadratic: central differences are exact but for rounding
@@ -221,14 +221,14 @@ mod tests {
             exact(&points[..5], &points[5..]).iter().zip(&weights).map(|(c, w)| c * w).sum()
         };
         let topology = Topology::new(&faces);
-        let coverage = Coverage::of(&points, &faces, WINDOW);
+        let coverage = Coverage::of(&points, &topology, WINDOW);
         let found = pulled_back(&topology, &points, &coverage, &weights);
         for (i, (found, expected)) in found.iter().zip(differences(&points, loss)).enumerate() {
             // where two outlines cross, a piece counts as a whole or not at all
             assert!((*found - expected).length() < 0.5 * LONGEST_PIECE, "{i}: {found} {expected}");
         }
         points[7] = DVec2::new(10.3, 8.2);
-        let coverage = Coverage::of(&points, &faces, WINDOW);
+        let coverage = Coverage::of(&points, &topology, WINDOW);
         let inside = pulled_back(&topology, &points, &coverage, &weights);
         assert_eq!(inside[5..], [DVec2::ZERO; 3]);
     }
@@ -279,8 +279,9 @@ mod tests {
         let radius = 25.3;
         let normals: Vec<DVec2> = (0..rows * columns).map(|k| direction(k).truncate()).collect();
         let points: Vec<DVec2> = normals.iter().map(|n| DVec2::splat(32.1) + *n * radius).collect();
-        let coverage = Coverage::of(&points, &faces, window);
-        let gradient = pulled_back(&Topology::new(&faces), &points, &coverage, &vec![1.0; window.area()]);
+        let topology = Topology::new(&faces);
+        let coverage = Coverage::of(&points, &topology, window);
+        let gradient = pulled_back(&topology, &points, &coverage, &vec![1.0; window.area()]);
         let growth: f64 = gradient.iter().zip(&normals).map(|(g, n)| g.dot(*n)).sum();
         let expected = std::f64::consts::TAU * radius;
         assert!((growth / expected - 1.0).abs() < 0.01, "{growth} {expected}");

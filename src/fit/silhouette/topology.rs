@@ -15,6 +15,7 @@ pub(in crate::fit) struct Topology {
     edges: Vec<[u32; 2]>,
     offsets: Vec<u32>,
     sides: Vec<Side>,
+    closed: bool,
 }
 
 impl Topology {
@@ -33,17 +34,24 @@ impl Topology {
             edges: Vec::new(),
             offsets: vec![0],
             sides: Vec::with_capacity(all.len()),
+            closed: true,
         };
         for group in all.chunk_by(|a, b| a.0 == b.0) {
             topology.edges.push(group[0].0);
             topology.sides.extend(group.iter().map(|&(_, face, forward)| Side { face, forward }));
             topology.offsets.push(topology.sides.len() as u32);
+            topology.closed &= 2 * group.iter().filter(|(.., forward)| *forward).count() == group.len();
         }
         topology
     }
 
     pub(in crate::fit) fn faces(&self) -> &[[u32; 3]] {
         &self.faces
+    }
+
+    /// Every edge is run along as often in one direction as in the other.
+    pub(super) fn is_closed(&self) -> bool {
+        self.closed
     }
 
     /// Every edge once, the lower index first.
