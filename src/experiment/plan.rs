@@ -1,5 +1,6 @@
 //! From experiments and data to jobs: pure, no file is opened.
 
+use super::recipe::Surface;
 use super::rows::{DataRow, Source, rows_of};
 use super::{
     AvatarRecipe, CodeVersions, Dataset, Error, Experiment, FitOptions, Options, Recipe, SequenceInfo, Shard,
@@ -288,8 +289,11 @@ impl Builder<'_> {
             Recipe::parse(name).map_err(|error| (error.to_string(), "a fitting recipe".to_owned()))?;
         let profile = &self.options.profile;
         let iterations = profile.fit_iterations.map_or(recipe.iterations, |most| recipe.iterations.min(most));
-        let start = content_key(&json!({ "start": of_frames, "how": recipe.start }));
         let options = FitOptions { recipe, iterations, seed: *seed, edge_mm: profile.avatar_edge_mm };
+        let how = &options.recipe.start;
+        let first_stage =
+            (how.surface == Surface::Silhouettes).then(|| (options.shape_iterations(), options.seed));
+        let start = content_key(&json!({ "start": of_frames, "how": how, "first_stage": first_stage }));
         Ok(Some(PlannedFit { options, start }))
     }
 

@@ -36,6 +36,42 @@ pub(super) fn vertices_with_faces(body: &RestBody) -> Vec<usize> {
     (0..used.len()).filter(|&i| used[i]).collect()
 }
 
+/// The directed sides 01, 12 and 20 of a face.
+fn sides([a, b, c]: [u32; 3]) -> [(u32, u32); 3] {
+    [(a, b), (b, c), (c, a)]
+}
+
+/// New vertices in the middles of edges, numbered in the order in which they are first asked for.
+pub(super) struct Middles {
+    first: usize,
+    of_edge: BTreeMap<[u32; 2], u32>,
+    /// The ends of each divided edge, the lower index first.
+    pub(super) edges: Vec<[u32; 2]>,
+}
+
+impl Middles {
+    /// None yet; the first will be vertex `first`.
+    pub(super) fn after(first: usize) -> Self {
+        Self { first, of_edge: BTreeMap::new(), edges: Vec::new() }
+    }
+
+    /// The vertex in the middle of the edge between two others, made if need be.
+    pub(super) fn of(&mut self, a: u32, b: u32) -> u32 {
+        let edge = [a.min(b), a.max(b)];
+        let next = (self.first + self.edges.len()) as u32;
+        let middle = *self.of_edge.entry(edge).or_insert(next);
+        if middle == next {
+            self.edges.push(edge);
+        }
+        middle
+    }
+
+    /// The vertex in the middle of an edge, if it was made.
+    fn known(&self, a: u32, b: u32) -> Option<u32> {
+        self.of_edge.get(&[a.min(b), a.max(b)]).copied()
+    }
+}
+
 /// No face is divided more often: 4^8 parts.
 const MOST_ROUNDS: usize = 8;
 /// Division stops here, whatever the edges.
@@ -66,29 +102,24 @@ impl Tessellation {
 
     /// One round; false if no edge was too long.
     fn halve_edges(&mut self, longest_edge: f64) -> bool {
-        let mut middles: BTreeMap<(u32, u32), u32> = BTreeMap::new();
-        for face in &self.faces {
-            for k in 0..3 {
-                let (a, b) = (face[k].min(face[(k + 1) % 3]), face[k].max(face[(k + 1) % 3]));
+        let mut middles = Middles::after(self.vertices.len());
+        for &face in &self.faces {
+            for (a, b) in sides(face) {
                 let (p, q) = (self.vertices[a as usize], self.vertices[b as usize]);
                 if p.distance_squared(q) > longest_edge * longest_edge {
-                    let next = self.vertices.len() as u32;
-                    if *middles.entry((a, b)).or_insert(next) == next {
-                        self.vertices.push((p + q) / 2.0);
-                    }
+                    middles.of(a, b);
                 }
             }
         }
-        if middles.is_empty() {
+        if middles.edges.is_empty() {
             return false;
         }
+        let middle = |&[a, b]: &[u32; 2]| (self.vertices[a as usize] + self.vertices[b as usize]) / 2.0;
+        let new: Vec<DVec3> = middles.edges.iter().map(middle).collect();
+        self.vertices.extend(new);
         let (old_faces, old_corners) = (std::mem::take(&mut self.faces), std::mem::take(&mut self.corners));
         for (face, corners) in old_faces.into_iter().zip(old_corners) {
-            let middle = |k: usize| {
-                let (a, b) = (face[k], face[(k + 1) % 3]);
-                middles.get(&(a.min(b), a.max(b))).copied()
-            };
-            self.divide(face, corners, [middle(0), middle(1), middle(2)]);
+            self.divide(face, corners, sides(face).map(|(a, b)| middles.known(a, b)));
         }
         true
     }

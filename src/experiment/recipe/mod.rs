@@ -58,6 +58,17 @@ pub struct FitOptions {
     pub edge_mm: u32,
 }
 
+impl FitOptions {
+    /// Iterations of the first stage, where there is one: a quarter of the fit's (§4.4 of the paper), but no more than
+    /// help. Its steps look at four frames each.
+    pub fn shape_iterations(&self) -> u32 {
+        (self.iterations / 4).clamp(1, MOST_SHAPE_ITERATIONS)
+    }
+}
+
+/// Beyond so many, outlines gain a ten-thousandth of their overlap and what lies between them drifts.
+const MOST_SHAPE_ITERATIONS: u32 = 400;
+
 /// What is behind the avatar and the truth in the loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -2,7 +2,7 @@
 
 use crate::data::sequence::{Sequence, Truth};
 use crate::fit::Error;
-use crate::math::random::SplitMix64;
+use crate::fit::frame_order::shuffled;
 use crate::scene::{Camera, Pose, PosedBody};
 
 /// Decoded frames are held up to this many bytes; the others are decoded again when their turn comes.
@@ -87,8 +87,7 @@ impl<'a> TrainingFrames<'a> {
         let n = self.slots.len();
         let (epoch, place) = (iteration / n, iteration % n);
         if self.epoch.as_ref().is_none_or(|(known, _)| *known != epoch) {
-            let mut random = SplitMix64::new(self.seed ^ (epoch as u64).wrapping_mul(0xA24B_AED4_963E_E407));
-            self.epoch = Some((epoch, random.permutation(n)));
+            self.epoch = Some((epoch, shuffled(n, self.seed, epoch as u64)));
         }
         self.epoch.as_ref().map_or(0, |(_, order)| order[place])
     }

@@ -16,6 +16,7 @@ pub use checkpoint::Checkpoint;
 
 use super::Error;
 use super::loss::{FrameLoss, Losses, Weights};
+use super::shape::{Ended, ShapeFit, fit_shape};
 use super::surface::{SurfaceInit, surface_init};
 use crate::data::sequence::Sequence;
 use crate::experiment::FitOptions;
@@ -31,6 +32,8 @@ use density::Density;
 use frames::TrainingFrames;
 use parameters::{Parameters, RatesNow};
 use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// Iterations between two bindings of the avatar to its body.
 const BETWEEN_BINDINGS: u32 = 50;
@@ -78,7 +81,7 @@ struct Scratch {
 /// The avatar with which a recipe starts.
 ///
 /// # Errors
-/// As [`surface_init`].
+/// As [`surface_init`] and [`fit_shape`]; a shape fit that diverges.
 pub fn start(sequence: &Sequence, options: &FitOptions) -> Result<Avatar, Error> {
     let start = &options.recipe.start;
     let init = SurfaceInit {
@@ -94,7 +97,25 @@ pub fn start(sequence: &Sequence, options: &FitOptions) -> Result<Avatar, Error>
         ..SurfaceInit::default()
     };
     match start.surface {
-        Surface::Outlines | Surface::Silhouettes => surface_init(sequence, &init),
+        Surface::Outlines => surface_init(sequence, &init),
+        Surface::Silhouettes => {
+            let settings = ShapeFit {
+                iterations: options.shape_iterations() as usize,
+                seed: options.seed,
+                ..ShapeFit::default()
+            };
+            let shape = fit_shape(sequence, &settings, &mut |_| ControlFlow::Continue(()))?;
+            if let Ended::NotFinite { iteration, frame } = shape.ended {
+                return Err(Error::Diverged {
+                    sequence: sequence.id.clone(),
+                    iteration: u32::try_from(iteration).unwrap_or(u32::MAX),
+                    frame,
+                    parameter: "offset of the surface".to_owned(),
+                });
+            }
+            let dressed = Sequence { body: Arc::new(shape.body), ..sequence.clone() };
+            surface_init(&dressed, &SurfaceInit { outline_rounds: 0, ..init })
+        }
     }
 }
 
@@ -196,7 +217,8 @@ impl<'a> Trainer<'a> {
         self.parameters.raise_sh_degree(recipe.sh_degree_at(self.iteration, iterations));
         let in_strategy = Error::strategy(self.sequence);
         if self.is_resting() {
-            self.bound = BoundAvatar::new(&self.parameters.avatar, &self.sequence.body).map_err(&in_strategy)?;
+            self.bound =
+                BoundAvatar::new(&self.parameters.avatar, &self.sequence.body).map_err(&in_strategy)?;
         } else {
             self.bound.update(&self.parameters.avatar).map_err(&in_strategy)?;
         }
