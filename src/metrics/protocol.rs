@@ -279,6 +279,28 @@ mod tests {
         assert_eq!(Protocol::preset("ihuman").unwrap().ssim, SsimVariant::Reflect);
     }
 
+    /// The network and the input range as read off each code.
+    #[test]
+    fn presets_have_the_lpips_of_their_papers() {
+        let expected = [
+            ("avatar-v1", "alex-pm1"),
+            ("hugs-human", "alex-raw01"),
+            ("hugs-full", "alex-raw01"),
+            ("ihuman", "alex-raw01"),
+            ("splattingavatar", "alex-pm1"),
+            ("animatable-ps", "alex-raw01"),
+            ("animatable-gala", "alex-raw01"),
+            ("haha", "alex-raw01"),
+            ("3dgs", "vgg-raw01"),
+            ("nerfbaselines", "alex-pm1"),
+            ("gauhuman", "vgg-raw01"),
+            ("3dgs-avatar", "alex-raw01"),
+            ("3dgs-avatar-zju", "vgg-pm1"),
+        ];
+        let found: Vec<(&str, &str)> = PROTOCOLS.iter().map(|p| (p.id.as_str(), p.lpips.id())).collect();
+        assert_eq!(found, expected);
+    }
+
     #[test]
     fn specifications_vary_a_preset() {
         let varied = Protocol::parse("haha+ssim=torchmetrics-1.4+background=[0, 0.5, 1]+mask_threshold=0.25");

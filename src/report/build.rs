@@ -120,7 +120,7 @@ fn content(variant: &VariantResults, metric: MetricKind) -> Content {
 
 fn not_computed(column: &Column) -> String {
     format!(
-        "n/c: {} was not computed for every frame (it needs the network's weights, and images of its minimum size)",
+        "n/c: {} was not computed for every frame (it needs the network's weights and images of its minimum size)",
         column.title()
     )
 }

@@ -1,6 +1,7 @@
 //! Cameras, images and masks.
 
 use crate::files::{self, Values};
+use crate::support::png::encode;
 use skinsplat::data::{camera, frames, npy};
 use skinsplat::scene::{Image, Mask};
 use std::path::{Path, PathBuf};
@@ -81,63 +82,24 @@ fn what_is_wrong_with_a_camera_is_named() {
     assert_eq!(camera::load(&path).unwrap_err().field(), "K");
 }
 
-fn png(folder: &Path, name: &str, colour: png_types::Colour, width: u32, data: &[u8]) -> PathBuf {
-    let path = folder.join(name);
-    png_types::write(&path, colour, width, data);
-    path
+/// How the one row of a PNG is stored.
+#[derive(Clone, Copy)]
+struct Colour {
+    bit_depth: u8,
+    colour_type: u8,
+    palette: &'static [u8],
 }
 
-/// PNG files by hand, so that palettes and odd bit depths can be made.
-mod png_types {
-    use std::path::Path;
-
-    #[derive(Clone, Copy)]
-    pub(super) struct Colour {
-        pub(super) bit_depth: u8,
-        pub(super) colour_type: u8,
-        pub(super) palette: &'static [u8],
-    }
-
-    pub(super) fn write(path: &Path, colour: Colour, width: u32, row: &[u8]) {
-        let mut header = Vec::new();
-        header.extend(width.to_be_bytes());
-        header.extend(1u32.to_be_bytes());
-        header.extend([colour.bit_depth, colour.colour_type, 0, 0, 0]);
-        let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
-        chunk(&mut file, b"IHDR", &header);
-        if !colour.palette.is_empty() {
-            chunk(&mut file, b"PLTE", colour.palette);
-        }
-        // One row, filter 0, as a stored deflate block in a zlib stream.
-        let raw = [&[0], row].concat();
-        let mut zlib = vec![0x78, 0x01, 1];
-        zlib.extend((raw.len() as u16).to_le_bytes());
-        zlib.extend((!(raw.len() as u16)).to_le_bytes());
-        zlib.extend(&raw);
-        let (a, b) = raw.iter().fold((1u32, 0u32), |(a, b), &v| {
-            let a = (a + u32::from(v)) % 65521;
-            (a, (b + a) % 65521)
-        });
-        zlib.extend((b << 16 | a).to_be_bytes());
-        chunk(&mut file, b"IDAT", &zlib);
-        chunk(&mut file, b"IEND", &[]);
-        std::fs::write(path, file).unwrap();
-    }
-
-    fn chunk(file: &mut Vec<u8>, kind: &[u8; 4], data: &[u8]) {
-        file.extend((data.len() as u32).to_be_bytes());
-        let body = [kind, data].concat();
-        let crc = !body.iter().fold(!0u32, |crc, &byte| {
-            (0..8).fold(crc ^ u32::from(byte), |c, _| if c & 1 == 1 { c >> 1 ^ 0xEDB8_8320 } else { c >> 1 })
-        });
-        file.extend(body);
-        file.extend(crc.to_be_bytes());
-    }
+fn png(folder: &Path, name: &str, colour: Colour, width: usize, data: &[u8]) -> PathBuf {
+    let Colour { bit_depth, colour_type, palette } = colour;
+    let palette: &[(&[u8; 4], &[u8])] = if palette.is_empty() { &[] } else { &[(b"PLTE", palette)] };
+    let path = folder.join(name);
+    std::fs::write(&path, encode((width, 1), bit_depth, colour_type, palette, data)).unwrap();
+    path
 }
 
 #[test]
 fn every_kind_of_png_is_read_as_straight_values() {
-    use png_types::Colour;
     let folder = tempfile::tempdir().unwrap();
     let kind = |bit_depth, colour_type| Colour { bit_depth, colour_type, palette: &[] };
     let load = |path: PathBuf| {

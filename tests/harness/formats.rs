@@ -187,7 +187,7 @@ fn holes_are_shown_not_averaged_away() {
 
     <sup>1</sup> anna, Matrices: 2 of 6 frames missing: image_0001 (failed: truth: image_0001.png is truncated), image_0002 (not run)
 
-    <sup>2</sup> n/c: LPIPS\* was not computed for every frame (it needs network weights)
+    <sup>2</sup> n/c: LPIPS\* was not computed for every frame (it needs the network's weights and images of its minimum size)
 
     <sup>3</sup> bob, Matrices: ssim 0.820 looks like a slip
 
@@ -201,11 +201,11 @@ fn holes_are_shown_not_averaged_away() {
     anna,"Matrices, paper",paper,0,0,20.10,0.920,0.1800,90,
     anna,Matrices − paper,difference,4,2,0.19999999999999574,0.00029999999999996696,-0.0002999999999999947,10,
     anna,Quaternions,measured,6,0,20.75,0.9207500000000001,0.17925000000000002,100,
-    bob,Matrices,measured,6,0,21,0.5,,100,n/c: LPIPS* was not computed for every frame (it needs network weights)
+    bob,Matrices,measured,6,0,21,0.5,,100,n/c: LPIPS* was not computed for every frame (it needs the network's weights and images of its minimum size)
     bob,"Matrices, paper",paper,0,0,21.00,0.820,0.1600,90,"bob, Matrices: ssim 0.820 looks like a slip"
     bob,Matrices − paper,difference,6,0,0,-0.31999999999999995,,10,
     bob,Quaternions,measured,6,0,inf,0.9348166666666667,0.14851666666666669,100,
-    Mean,Matrices,mean,10,2,20.65,0.7101500000000001,,100,"n/c: LPIPS* was not computed for every frame (it needs network weights); Mean, Matrices: 2 frames missing in all"
+    Mean,Matrices,mean,10,2,20.65,0.7101500000000001,,100,"n/c: LPIPS* was not computed for every frame (it needs the network's weights and images of its minimum size); Mean, Matrices: 2 frames missing in all"
     Mean,Quaternions,mean,12,0,inf,0.9277833333333334,0.16388333333333335,100,
     "#);
 }
@@ -320,7 +320,7 @@ fn a_table_value_as_json() {
       ],
       "notes": [
         "anna, Matrices: 2 of 6 frames missing: image_0001 (failed: truth: image_0001.png is truncated), image_0002 (not run)",
-        "n/c: LPIPS* was not computed for every frame (it needs network weights)",
+        "n/c: LPIPS* was not computed for every frame (it needs the network's weights and images of its minimum size)",
         "bob, Matrices: ssim 0.820 looks like a slip",
         "Mean, Matrices: 2 frames missing in all"
       ],

@@ -3,6 +3,8 @@
 
 use std::path::PathBuf;
 
+pub mod png;
+
 /// A file under `tests/data`.
 pub fn data(path: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(path)
