@@ -1,5 +1,5 @@
-//! Time of the metrics of one 512 x 512 frame on one core: every variant of `reproduce score`, single SSIMs, and the
-//! default protocol. `cargo bench --bench metrics`.
+//! Time of the metrics of one 512 x 512 frame on one core: every variant of `reproduce score`, single SSIMs, the default
+//! protocol, and LPIPS with AlexNet, of a pair and of a second render against a truth that was seen. `cargo bench --bench metrics`.
 #![allow(
     clippy::unwrap_used,
     missing_docs,
@@ -7,8 +7,12 @@
 )]
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use skinsplat::data::lpips_weights::Networks;
+use skinsplat::metrics::lpips::OneFrame;
 use skinsplat::metrics::ssim::ssim_of_planes;
-use skinsplat::metrics::{Planes, Protocol, SsimVariant, Truth, all_variants};
+use skinsplat::metrics::{
+    LpipsVariant, PerceptualDistance, Planes, Protocol, SsimVariant, Truth, all_variants,
+};
 use skinsplat::scene::{Image, Mask};
 use std::hint::black_box;
 
@@ -48,6 +52,17 @@ fn metrics(c: &mut Criterion) {
     bench("default_protocol", &|| {
         let truth = Truth::Straight { rgb: &truth, alpha: &mask };
         black_box(protocol.score(&render, truth).unwrap());
+    });
+    let (networks, variant) = (Networks::default(), LpipsVariant::ALL[0]);
+    let other = Planes::new(&image(0.1), "image").unwrap();
+    bench("lpips_alex", &|| {
+        black_box(OneFrame::new(&networks).distance(&planes[0], &planes[1], variant).unwrap());
+    });
+    bench("lpips_alex_two_renders_of_a_truth", &|| {
+        let frame = OneFrame::new(&networks);
+        for render in [&planes[0], &other] {
+            black_box(frame.distance(render, &planes[1], variant).unwrap());
+        }
     });
 }
 
