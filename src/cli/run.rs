@@ -20,8 +20,8 @@ pub(super) const DEFAULT_OUT: &str = "runs/default";
 
 /// Evaluate: make avatars, pose, render, score, and write the tables.
 ///
-/// Writes tables.md, one .csv and .tex per table, results.json (see reports/SCHEMA.md) and run.json (who, when, how
-/// fast). frames.jsonl remembers every frame by its content: a run that is killed goes on where it stopped, and a run with
+/// Writes tables.md, one .csv and .tex per table, results.json (see reports/SCHEMA.md), curves.csv (how the fits went) and
+/// run.json (who, when, how fast). frames.jsonl remembers every frame by its content: a run that is killed goes on where it stopped, and a run with
 /// other settings redoes only what they change. Slices (--shard) write results of their own; when all are done, run again
 /// without --shard to collect them.
 #[derive(Debug, clap::Args)]
@@ -88,6 +88,9 @@ impl Run {
         let records: Records = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
         let results = report::results(&planned.plan, &planned.experiments, &records)?;
         write_results(&self.out, &results)?;
+        if let Some(text) = run::curves::csv(&planned.plan, &self.out.join(AVATARS))? {
+            write_text(&self.out.join("curves.csv"), &text)?;
+        }
         write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
         if self.images {
             self.write_images(planned, &records, context)?;

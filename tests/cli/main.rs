@@ -13,6 +13,7 @@ mod bad_outputs;
 mod bad_plans;
 mod blending;
 mod catalogues;
+mod fitting;
 mod lpips;
 mod made_up;
 mod posing;

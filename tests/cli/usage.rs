@@ -4,8 +4,8 @@ use crate::args;
 use crate::program::Desk;
 use std::process::{Command, Stdio};
 
-const SUBCOMMANDS: [&str; 10] =
-    ["run", "plan", "report", "list", "render", "skin", "score", "blend", "inspect", "completions"];
+const SUBCOMMANDS: [&str; 11] =
+    ["run", "plan", "report", "list", "fit", "render", "skin", "score", "blend", "inspect", "completions"];
 
 #[test]
 fn top_level_help() {
@@ -18,7 +18,8 @@ fn top_level_help() {
       run          Evaluate: make avatars, pose, render, score, and write the tables
       plan         Show what a run would do, without doing it
       report       Print the tables of a run again, or compare them with a baseline
-      list         List experiments, datasets, strategies, protocols or metrics
+      list         List experiments, datasets, strategies, recipes, protocols or metrics
+      fit          Fit an avatar to a subject's training frames
       render       Render a 3DGS PLY, posed or as it stands
       skin         Pose an avatar and write a plain static 3DGS PLY
       score        Score renders against truth: two images, or two folders whose frames pair up by name

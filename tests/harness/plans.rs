@@ -61,31 +61,45 @@ fn stand_ins_are_of_the_right_kind_and_all_of_their_test_sequences_run() {
 #[test]
 fn avatars_are_shared_by_tables_that_make_the_same_ones() {
     let plan = planned(&Experiment::embedded(), &[figures()]);
-    let made: Vec<(&str, &str, Option<u8>)> = plan
+    let made: Vec<(&str, &str)> = plan
         .avatars
         .iter()
         .map(|avatar| {
-            let recipe = match avatar.recipe {
-                AvatarRecipe::SurfaceVertex {} => "vertex",
-                AvatarRecipe::SurfaceFace { .. } => "face",
+            let recipe = match &avatar.recipe {
+                AvatarRecipe::Fit { name, .. } => name,
                 AvatarRecipe::TexturedMesh { .. } => "mesh",
-                AvatarRecipe::File { .. } => "file",
+                other => panic!("{other:?}"),
             };
-            (avatar.subject.as_str(), recipe, avatar.sh_degree)
+            (avatar.subject.as_str(), recipe)
         })
         .collect();
     assert_eq!(
         made,
         [
-            ("mono", "vertex", Some(3)),
-            ("mono", "face", Some(2)), // tables 2 and 3
-            ("mono", "face", Some(0)),
-            ("multi", "vertex", Some(2)),
-            ("mono", "vertex", Some(2)),
-            ("hands", "mesh", None),
-            ("hands", "vertex", Some(3)),
+            ("mono", "hugs-original"),
+            ("mono", "hugs-skinned"),
+            ("mono", "ihuman-original"),
+            ("mono", "ihuman-skinned"),
+            ("mono", "splattingavatar-original"),
+            ("mono", "splattingavatar-skinned"),
+            ("mono", "splattingavatar-skinned-degree-0"),
+            ("multi", "animatable-original"),
+            ("multi", "animatable-skinned"),
+            ("mono", "animatable-original"),
+            ("mono", "animatable-skinned"),
+            ("hands", "mesh"),
+            ("hands", "pure-skinned"),
         ]
     );
+    let starts: BTreeSet<&str> =
+        plan.avatars.iter().filter_map(|avatar| Some(avatar.fit.as_ref()?.start.as_str())).collect();
+    assert_eq!(
+        starts.len(),
+        4,
+        "on mono's vertices and faces, on multi's vertices, on hands' fitted surface"
+    );
+    let swap = planned(&Experiment::embedded_all()[1..2], &[figures()]);
+    assert_eq!(swap.avatars.len(), 5, "five fits, drawn 25 times");
     let known: BTreeSet<&str> = plan.avatars.iter().map(|avatar| avatar.key.as_str()).collect();
     assert!(plan.jobs.iter().flat_map(|job| &job.variants).all(|v| known.contains(v.avatar.as_str())));
 }
@@ -115,6 +129,26 @@ fn keys_follow_what_numbers_depend_on() {
     for (what, change) in depends {
         assert!(seen.insert(first(&with(change))), "{what}");
     }
+    let fitted = |name: &str, seed: u64, profile: Profile| {
+        let mut experiment = table_7();
+        experiment.variants[0].avatar = AvatarRecipe::Fit { name: name.into(), seed };
+        experiment.variants[0].sh_degree = None;
+        let options = Options { profile, ..options() };
+        first(&plan(&[experiment], &[own_data(3)], &options).unwrap())
+    };
+    let (standard, longer) =
+        (Profile::standard(), Profile { fit_iterations: Some(2001), ..Profile::standard() });
+    for (what, name, seed, profile) in [
+        ("fit", "hugs-skinned", 0, &standard),
+        ("seed", "hugs-skinned", 1, &standard),
+        ("recipe's strategy", "hugs-original", 0, &standard),
+        ("recipe's choice", "hugs-skinned+rates.rotation=0.1", 0, &standard),
+        ("iterations", "hugs-skinned", 0, &longer),
+    ] {
+        assert!(seen.insert(fitted(name, seed, profile.clone())), "{what}");
+    }
+    let same = "hugs-skinned+rates.rotation=4e-3";
+    assert_eq!(fitted(same, 0, standard.clone()), fitted("hugs-skinned", 0, standard), "names do not count");
     let free: [Change; 4] = [
         ("id", &|e| e.id = "other".into()),
         ("captions", &|e| e.caption = "Other".into()),
