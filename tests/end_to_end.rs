@@ -223,7 +223,7 @@ fn a_folder_of_ones_own_and_a_frame_that_fails() {
 fn the_papers_tables_on_a_folder() {
     let desk = Desk::new();
     let data = support::data("blender");
-    let page = desk.ok(args!["run", "--data", data, "--out", "run", "--limit", "1"]);
+    let page = desk.ok(args!["run", "--data", data, "--out", "run", "--limit", "1", "--fit-iterations", "2"]);
     for table in 1..=6 {
         assert!(page.contains(&format!("## Table {table}")), "{page}");
         assert!(desk.path(&format!("run/table{table}.csv")).is_file());

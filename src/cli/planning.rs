@@ -17,6 +17,9 @@ pub(super) struct Planning {
     /// How much of the data to look at: quick (256 pixels, few frames, short fits), standard (everything), paper (long fits)
     #[arg(long, value_name = "P", default_value = "quick", value_parser = profile)]
     profile: Profile,
+    /// Most iterations of a fit [default: the profile's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    fit_iterations: Option<u32>,
     /// Add a row for every strategy
     #[arg(long)]
     all_strategies: bool,
@@ -63,9 +66,14 @@ impl Planning {
         let networks = self.lpips.networks()?;
         let given = |(net, digest): (_, &str)| GivenWeights { net, digest: digest.to_owned() };
         let lpips_weights = networks.given().map(given);
-        let options = Options { profile: self.profile.clone(), subset, lpips_weights };
+        let options = Options { profile: self.profile(), subset, lpips_weights };
         let plan = experiment::plan(&experiments, &library.describe()?, &options)?;
         Ok(Planned { plan, experiments, library, networks })
+    }
+
+    fn profile(&self) -> Profile {
+        let fit_iterations = self.fit_iterations.or(self.profile.fit_iterations);
+        Profile { fit_iterations, ..self.profile.clone() }
     }
 
     fn experiments(&self) -> Result<Vec<Experiment>> {

@@ -1,7 +1,7 @@
 //! What a table says about where its numbers come from.
 
 use super::results::SequenceResults;
-use crate::experiment::{Experiment, Options, PlannedTable, Profile, Source, Subset};
+use crate::experiment::{AvatarRecipe, Experiment, Options, PlannedTable, Profile, Source, Subset, Variant};
 
 /// The table's caption: of its own data, or the stand-in's, which does not name that data.
 pub(super) fn caption(experiment: &Experiment, source: Source) -> String {
@@ -37,7 +37,7 @@ pub(super) fn ran_on(
     let mut sentences = vec![
         data,
         format!("Protocol: {}, version {}", planned.protocol.id, planned.protocol.version),
-        profile(&options.profile),
+        profile(&options.profile, experiment),
         frames(sequences),
     ];
     if !options.subset.is_everything() {
@@ -49,7 +49,7 @@ pub(super) fn ran_on(
     sentences
 }
 
-fn profile(profile: &Profile) -> String {
+fn profile(profile: &Profile, experiment: &Experiment) -> String {
     let mut bounds = Vec::new();
     if let Some(n) = profile.max_test_frames {
         bounds.push(format!("at most {n} test frames per sequence"));
@@ -60,10 +60,16 @@ fn profile(profile: &Profile) -> String {
     if let Some(side) = profile.resolution {
         bounds.push(format!("images of at most {side} pixels a side"));
     }
-    match bounds.is_empty() {
-        true => format!("Profile: {}, every frame at native resolution", profile.id),
-        false => format!("Profile: {}, {}", profile.id, bounds.join(", ")),
+    if bounds.is_empty() {
+        bounds.push("every frame at native resolution".to_owned());
     }
+    let fitted = |variant: &Variant| matches!(variant.avatar, AvatarRecipe::Fit { .. });
+    if let Some(n) = profile.fit_iterations
+        && experiment.variants.iter().any(fitted)
+    {
+        bounds.push(format!("fits of at most {n} iterations"));
+    }
+    format!("Profile: {}, {}", profile.id, bounds.join(", "))
 }
 
 /// How many frames a variant was planned to be scored on.

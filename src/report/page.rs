@@ -2,7 +2,7 @@
 
 use super::captions::count;
 use super::{Results, markdown};
-use crate::experiment::{ADDED_VARIANT, Options};
+use crate::experiment::{ADDED_VARIANT, Options, Profile};
 
 /// The page: how it was made, what is missing, and the tables.
 pub fn page(results: &Results) -> String {
@@ -40,6 +40,10 @@ fn command(results: &Results) -> String {
     let variants = results.tables.iter().flat_map(|t| &t.sequences).flat_map(|sequence| &sequence.variants);
     if variants.map(|variant| &variant.id).any(|id| id.starts_with(ADDED_VARIANT)) {
         words.push("--all-strategies".to_owned());
+    }
+    let usual = Profile::preset(&profile.id).and_then(|preset| preset.fit_iterations);
+    if let Some(iterations) = profile.fit_iterations.filter(|_| profile.fit_iterations != usual) {
+        words.push(format!("--fit-iterations {iterations}"));
     }
     if let Some(given) = lpips_weights {
         words.push(format!("--lpips-weights lpips_{}.safetensors", given.net.id()));

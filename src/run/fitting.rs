@@ -195,7 +195,7 @@ impl Progress {
         *psnr += step.psnr;
         *count += 1;
         let every = step.iterations.div_ceil(CURVE_POINTS);
-        if step.iteration % every == 0 || step.iteration == step.iterations {
+        if step.iteration.is_multiple_of(every) || step.iteration == step.iterations {
             let n = f64::from(*count);
             self.curve.push(Step { loss: *loss / n, psnr: *psnr / n, ..step });
             self.since = (0.0, 0.0, 0);

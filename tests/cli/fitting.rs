@@ -28,7 +28,7 @@ fn a_fit_leaves_an_avatar_that_poses_and_says_how_it_was_made() {
     let printed: Value = serde_json::from_str(&desk.ok(fit.clone())).unwrap();
     let sidecar: Value = serde_json::from_str(&desk.read("ava.json")).unwrap();
     assert_eq!(printed, sidecar);
-    assert_eq!(sidecar["trained_on"], "snapshot_ava/snapshot_ava/train");
+    assert_eq!(sidecar["trained_on"], "snapshot_ava/snapshot_ava/train_casual");
     assert_eq!((&sidecar["options"]["seed"], &sidecar["options"]["iterations"]), (&5.into(), &4.into()));
     assert_eq!(sidecar["options"]["recipe"]["strategy"], "quaternion-average");
     assert_eq!(sidecar["curve"].as_array().unwrap().len(), 4);

@@ -260,7 +260,7 @@ impl Recipe {
     pub fn sh_degree_at(&self, iteration: u32, iterations: u32) -> usize {
         let full = usize::from(self.sh_degree);
         let step = (f64::from(self.sh_step) * f64::from(iterations)).round() as u32;
-        if step == 0 { full } else { full.min((iteration / step) as usize) }
+        iteration.checked_div(step).map_or(full, |raised| full.min(raised as usize))
     }
 
     /// The recipe without its names: what a fit depends on.

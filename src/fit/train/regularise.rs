@@ -93,7 +93,7 @@ mod tests {
     use crate::scene::{FaceBinding, Gaussians};
 
     fn avatar() -> Avatar {
-        let scales = [[0.02f32, 0.001, 0.0004], [0.003, 0.03, 0.001], [0.004, 0.0041, 0.0039]];
+        let scales = [[0.02f32, 0.001, 0.0004], [0.0025, 0.03, 0.001], [0.004, 0.0041, 0.0039]];
         let gaussians = Gaussians {
             means: vec![Vec3::new(0.1, 0.2, 0.3); 3],
             rotations: vec![[1.0, 0.0, 0.0, 0.0]; 3],
