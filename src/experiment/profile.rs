@@ -33,7 +33,7 @@ impl Profile {
             max_test_frames: Some(6),
             resolution: Some(256),
             fit_iterations: Some(300),
-            avatar_edge_mm: 18,
+            avatar_edge_mm: 14,
         }
     }
 

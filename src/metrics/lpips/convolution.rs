@@ -1,7 +1,7 @@
 //! Convolution of feature maps: an implicit matrix product on vector instructions.
 //!
 //! Patches of the input are copied next to each other (never the whole `im2col` matrix) and multiplied with weights that
-//! were laid out for it when the network was loaded. An output value is a sum of blocks of [`DEPTH`] products; inside a
+//! were laid out for it when the network was loaded. An output value is a sum of blocks of `DEPTH` products; inside a
 //! block, products are added one after another with fused multiply-adds, on every instruction set: the bits depend on
 //! neither the vector width nor on how the work is cut.
 
