@@ -20,6 +20,9 @@ pub(super) struct Planning {
     /// Most iterations of a fit [default: the profile's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     fit_iterations: Option<u32>,
+    /// Repeat every fit with these seeds, and print means and spreads: --seeds 0,1,2 [default: the experiment's]
+    #[arg(long, value_name = "S,…", value_delimiter = ',')]
+    seeds: Vec<u64>,
     /// Add a row for every strategy
     #[arg(long)]
     all_strategies: bool,
@@ -92,7 +95,9 @@ impl Planning {
         }
         let chosen = if chosen.is_empty() { Experiment::embedded() } else { chosen };
         let extend = self.all_strategies;
-        Ok(if extend { chosen.iter().map(Experiment::with_all_strategies).collect() } else { chosen })
+        let chosen =
+            if extend { chosen.iter().map(Experiment::with_all_strategies).collect() } else { chosen };
+        Ok(chosen.into_iter().map(|e| e.with_seeds(&self.seeds)).collect::<Result<_, _>>()?)
     }
 }
 

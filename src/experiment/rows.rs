@@ -48,13 +48,12 @@ pub(super) fn rows_of(
         return (Source::Own, own_rows(experiment, own, options));
     }
     let Some(stand_in) = &experiment.stand_in else { return (Source::Absent, Vec::new()) };
-    let of_kind = |d: &&Dataset| d.subjects.iter().any(|s| s.capture == stand_in.capture);
+    let fits = |s: &&SubjectInfo| stand_in.capture.is_none_or(|capture| s.capture == capture);
+    let of_kind = |d: &&Dataset| d.subjects.iter().any(|s| fits(&s));
     let several = datasets.iter().filter(of_kind).count() > 1;
     let mut rows = Vec::new();
     for dataset in datasets {
-        for subject in
-            dataset.subjects.iter().filter(|s| s.capture == stand_in.capture && chosen(options, &s.id))
-        {
+        for subject in dataset.subjects.iter().filter(|s| fits(s) && chosen(options, &s.id)) {
             for mut row in stand_in_rows(stand_in, dataset, subject, options) {
                 if several && dataset.id != subject.id {
                     row.label = format!("{}: {}", dataset.id, row.label);

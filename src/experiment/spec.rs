@@ -1,6 +1,6 @@
 //! The experiment file: one table, described as data.
 
-use super::{Capture, EMBEDDED, Error, FURTHER, Paper, Source, Split, catalog, validate};
+use super::{Capture, EMBEDDED, Error, FURTHER, Paper, Replicate, Source, Split, catalog, seeds, validate};
 use crate::metrics::MetricKind;
 use crate::strategy::PRESETS;
 use serde::{Deserialize, Serialize};
@@ -50,7 +50,11 @@ pub struct Experiment {
     pub stand_in: Option<StandIn>,
     /// The metric columns.
     pub columns: Vec<Column>,
-    /// What is compared.
+    /// Seeds with which every fitted variant is repeated; each variant's own seed if empty. Tables print means over seeds
+    /// and their spread.
+    #[serde(default)]
+    pub seeds: Vec<u64>,
+    /// What is compared, once per seed where there are several.
     pub variants: Vec<Variant>,
     /// The printed table, if there is one.
     pub paper: Option<Paper>,
@@ -81,8 +85,9 @@ pub struct Average {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandIn {
-    /// The kind of capture that a subject must be.
-    pub capture: Capture,
+    /// The kind of capture that a subject must be; any if absent.
+    #[serde(default)]
+    pub capture: Option<Capture>,
     /// Caption of a table made from stand-in data; it must not name the table's own data set.
     pub caption: String,
     /// Scoring protocol of the stand-in where the table's own does not fit it; the table's own if absent.
@@ -143,6 +148,9 @@ pub struct Variant {
     /// SH degree of the colour, 0 to 3, for avatars that are made here.
     #[serde(default)]
     pub sh_degree: Option<u8>,
+    /// The variant of the file that this one repeats.
+    #[serde(skip)]
+    pub replicate: Option<Replicate>,
 }
 
 /// Where an avatar comes from.
@@ -233,7 +241,7 @@ impl Experiment {
     pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
         let experiment: Self = toml::from_str(text).map_err(|error| toml_error(text, file, &error))?;
         validate::experiment(&experiment, file)?;
-        Ok(experiment)
+        Ok(seeds::expand(experiment))
     }
 
     /// The variant of this id.
@@ -272,6 +280,7 @@ impl Experiment {
                     },
                     paper: None,
                     strategy: Some(preset.id.to_owned()),
+                    replicate: None,
                     ..model.clone()
                 });
             }

@@ -1,6 +1,6 @@
 //! Checks of an experiment that its types cannot make.
 
-use super::{AvatarRecipe, Error, Experiment, Paper, Recipe, Role, Split, Variant, catalog};
+use super::{AvatarRecipe, Error, Experiment, Paper, Recipe, Role, Split, Variant, catalog, seeds};
 use std::collections::BTreeSet;
 
 /// Checks one experiment.
@@ -48,6 +48,7 @@ pub(super) fn experiment(e: &Experiment, file: &str) -> Result<(), Error> {
     for (i, variant) in e.variants.iter().enumerate() {
         variant_is_possible(variant, &format!("variants[{i}]"), file)?;
     }
+    seeds::check(e, file)?;
     stand_in_keeps_its_name(e, file)?;
     if let Some(paper) = &e.paper {
         paper_is_complete(e, paper, file)?;

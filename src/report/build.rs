@@ -3,6 +3,7 @@
 use super::captions::{caption, count, ran_on};
 use super::layout::{Entry, mark_best_per_sequence, shape};
 use super::paper::{beside, printed_table};
+use super::replicates::{Group, groups, spread};
 use super::results::{FrameResult, SequenceResults, VariantResults};
 use super::stats::paired;
 use super::table::{Cell, Comparison, Content, MetricDifference, RowKind, Table};
@@ -41,10 +42,12 @@ pub(super) fn table(
 ) -> Table {
     let mut notes = Notes::default();
     let mut entries: Vec<Entry> = Vec::new();
+    let groups = sequences.first().map_or_else(Vec::new, |first| groups(experiment, &first.variants));
     for sequence in sequences {
-        for variant in &sequence.variants {
-            let entry = measured(experiment, sequence, variant, &mut notes);
-            let compared = beside(experiment, planned.source, &variant.id, &entry, &mut notes);
+        for group in &groups {
+            let entry = measured(experiment, sequence, group, &mut notes);
+            let id = &sequence.variants[group.members[0]].id;
+            let compared = beside(experiment, planned.source, id, &entry, &mut notes);
             entries.push(entry);
             entries.extend(compared);
         }
@@ -52,9 +55,10 @@ pub(super) fn table(
     if let Some(average) = &experiment.average
         && !sequences.is_empty()
     {
-        for (v, variant) in sequences[0].variants.iter().enumerate() {
-            let entry = mean(experiment, &average.label, sequences, v, &mut notes);
-            let compared = beside(experiment, planned.source, &variant.id, &entry, &mut notes);
+        for group in &groups {
+            let entry = mean(experiment, &average.label, sequences, group, &mut notes);
+            let id = &sequences[0].variants[group.members[0]].id;
+            let compared = beside(experiment, planned.source, id, &entry, &mut notes);
             entries.push(entry);
             entries.extend(compared);
         }
@@ -72,41 +76,47 @@ pub(super) fn table(
         rows: shape.rows,
         notes: notes.into_vec(),
         remarks: if planned.source == Source::Absent { Vec::new() } else { experiment.notes.clone() },
-        comparisons: comparisons(experiment, sequences),
+        comparisons: comparisons(experiment, sequences, &groups),
         paper: experiment.paper.as_ref().map(|paper| Box::new(printed_table(experiment, paper))),
     }
 }
 
-/// The numbers of a variant on a sequence.
-fn measured(
-    experiment: &Experiment,
-    sequence: &SequenceResults,
-    variant: &VariantResults,
-    notes: &mut Notes,
-) -> Entry {
-    let at = format!("{}, {}", sequence.label, variant.label);
-    let missing = variant.missing();
+/// The numbers of a variant on a sequence: means over its seeds.
+fn measured(experiment: &Experiment, sequence: &SequenceResults, group: &Group, notes: &mut Notes) -> Entry {
+    let members = group.on(sequence);
+    let missing = members.iter().map(|variant| variant.missing()).sum();
     let cell = |column: &Column| {
-        let content = content(variant, column.metric);
-        let mut cell = Cell { missing, ..Cell::new(content, column.decimals()) };
+        let contents: Vec<Content> = members.iter().map(|variant| content(variant, column.metric)).collect();
+        let mut cell = over_seeds(&contents, column);
+        cell.missing = missing;
         if let Some(reason) = &sequence.missing {
             cell.notes.push(notes.index(format!("{}: {reason}", sequence.label)));
-        } else if missing > 0 && content != Content::NotApplicable {
-            cell.notes.push(notes.index(format!("{at}: {}", missing_frames(&variant.frames))));
+        } else if cell.content != Content::NotApplicable {
+            for variant in members.iter().filter(|variant| variant.missing() > 0) {
+                let at = format!("{}, {}", sequence.label, variant.label);
+                cell.notes.push(notes.index(format!("{at}: {}", missing_frames(&variant.frames))));
+            }
         }
-        if content == Content::NotComputed {
+        if cell.content == Content::NotComputed {
             cell.notes.push(notes.index(not_computed(column)));
         }
         cell
     };
     Entry {
         sequence: sequence.label.clone(),
-        variant: variant.label.clone(),
+        variant: group.label.clone(),
         kind: RowKind::Measured,
         cells: experiment.columns.iter().map(cell).collect(),
-        frames: variant.scored(),
+        frames: members.iter().map(|variant| variant.scored()).sum(),
         missing,
     }
+}
+
+/// The mean of one number per seed, with its spread.
+fn over_seeds(contents: &[Content], column: &Column) -> Cell {
+    let values: Vec<f64> = contents.iter().filter_map(|content| content.value()).collect();
+    let spread = if values.len() == contents.len() { spread(&values) } else { None };
+    Cell::with_spread(mean_content(contents), spread, column.decimals())
 }
 
 fn content(variant: &VariantResults, metric: MetricKind) -> Content {
@@ -144,34 +154,38 @@ fn mean(
     experiment: &Experiment,
     label: &str,
     sequences: &[SequenceResults],
-    variant: usize,
+    group: &Group,
     notes: &mut Notes,
 ) -> Entry {
-    let all: Vec<&VariantResults> = sequences.iter().map(|sequence| &sequence.variants[variant]).collect();
-    let missing: usize = all.iter().map(|v| v.missing()).sum();
-    let without = sequences.iter().find(|sequence| sequence.variants[variant].summary.is_none());
+    let all = || sequences.iter().flat_map(|sequence| group.on(sequence));
+    let missing: usize = all().map(|v| v.missing()).sum();
+    let without = sequences.iter().find(|s| group.on(s).iter().any(|variant| variant.summary.is_none()));
     let cell = |column: &Column| {
-        let contents: Vec<Content> = all.iter().map(|v| content(v, column.metric)).collect();
-        let mean = mean_content(&contents);
-        let mut cell = Cell { missing, ..Cell::new(mean, column.decimals()) };
-        if let (Some(sequence), Content::Missing) = (without, mean) {
-            let note = format!("{label}, {}: no mean, {} has no value", all[0].label, sequence.label);
+        let of_seed = |&v: &usize| {
+            let contents: Vec<Content> =
+                sequences.iter().map(|sequence| content(&sequence.variants[v], column.metric)).collect();
+            mean_content(&contents)
+        };
+        let mut cell = over_seeds(&group.members.iter().map(of_seed).collect::<Vec<_>>(), column);
+        cell.missing = missing;
+        if let (Some(sequence), Content::Missing) = (without, cell.content) {
+            let note = format!("{label}, {}: no mean, {} has no value", group.label, sequence.label);
             cell.notes.push(notes.index(note));
-        } else if missing > 0 && mean != Content::NotApplicable {
-            let note = format!("{label}, {}: {} missing in all", all[0].label, count(missing, "frame"));
+        } else if missing > 0 && cell.content != Content::NotApplicable {
+            let note = format!("{label}, {}: {} missing in all", group.label, count(missing, "frame"));
             cell.notes.push(notes.index(note));
         }
-        if mean == Content::NotComputed {
+        if cell.content == Content::NotComputed {
             cell.notes.push(notes.index(not_computed(column)));
         }
         cell
     };
     Entry {
         sequence: label.to_owned(),
-        variant: all[0].label.clone(),
+        variant: group.label.clone(),
         kind: RowKind::Mean,
         cells: experiment.columns.iter().map(cell).collect(),
-        frames: all.iter().map(|v| v.scored()).sum(),
+        frames: all().map(|v| v.scored()).sum(),
         missing,
     }
 }
@@ -188,46 +202,65 @@ fn mean_content(contents: &[Content]) -> Content {
 }
 
 /// Every variant against the baseline, on each sequence and on all of them.
-fn comparisons(experiment: &Experiment, sequences: &[SequenceResults]) -> Vec<Comparison> {
+fn comparisons(experiment: &Experiment, sequences: &[SequenceResults], groups: &[Group]) -> Vec<Comparison> {
     let Some(first) = sequences.first() else { return Vec::new() };
     let Some(b) = first.variants.iter().position(|v| v.id == experiment.baseline) else { return Vec::new() };
-    let others: Vec<usize> = (0..first.variants.len()).filter(|&v| v != b).collect();
-    let compare = |sequence: Option<String>, over: &[SequenceResults], v: usize| Comparison {
+    let Some(baseline) = groups.iter().find(|group| group.members.contains(&b)) else { return Vec::new() };
+    let others: Vec<&Group> = groups.iter().filter(|group| !group.members.contains(&b)).collect();
+    let compare = |sequence: Option<String>, over: &[SequenceResults], group: &Group| Comparison {
         sequence,
-        variant: first.variants[v].label.clone(),
-        baseline: first.variants[b].label.clone(),
-        differences: differences(experiment, over, b, v),
+        variant: group.label.clone(),
+        baseline: baseline.label.clone(),
+        differences: differences(experiment, over, &pairs(baseline, group)),
     };
     let mut all: Vec<Comparison> = Vec::new();
     for sequence in sequences {
         let one = std::slice::from_ref(sequence);
-        all.extend(others.iter().map(|&v| compare(Some(sequence.label.clone()), one, v)));
+        all.extend(others.iter().map(|group| compare(Some(sequence.label.clone()), one, group)));
     }
     if sequences.len() > 1 {
-        all.extend(others.iter().map(|&v| compare(None, sequences, v)));
+        all.extend(others.iter().map(|group| compare(None, sequences, group)));
     }
     all
+}
+
+/// (baseline, variant) per seed; a variant without seeds is compared with every one of the other's.
+fn pairs(baseline: &Group, group: &Group) -> Vec<(usize, usize)> {
+    let of = |group: &Group, i: usize| group.members[i.min(group.members.len() - 1)];
+    let seeds = baseline.members.len().max(group.members.len());
+    (0..seeds).map(|i| (of(baseline, i), of(group, i))).collect()
 }
 
 fn differences(
     experiment: &Experiment,
     sequences: &[SequenceResults],
-    baseline: usize,
-    variant: usize,
+    pairs: &[(usize, usize)],
 ) -> Vec<MetricDifference> {
     let columns = experiment.columns.iter().filter(|column| column.metric != MetricKind::Splats);
     let difference = |column: &Column| {
-        let of_sequence = |sequence: &SequenceResults| -> Vec<f64> {
-            let pairs = sequence.variants[variant].frames.iter().zip(&sequence.variants[baseline].frames);
-            pairs
-                .filter_map(|(ours, theirs)| Some(ours.value(column.metric)? - theirs.value(column.metric)?))
-                .collect()
+        let of_frame = |sequence: &SequenceResults, (b, v): (usize, usize), frame: usize| {
+            let value = |variant: usize| sequence.variants[variant].frames[frame].value(column.metric);
+            Some(value(v)? - value(b)?)
         };
-        let sequences: Vec<Vec<f64>> = sequences.iter().map(of_sequence).collect();
+        let of_sequence = |sequence: &SequenceResults, pairs: &[(usize, usize)]| -> Vec<f64> {
+            let frames = 0..sequence.variants[pairs[0].0].frames.len();
+            let mean = |frame: usize| {
+                let each: Option<Vec<f64>> = pairs.iter().map(|&p| of_frame(sequence, p, frame)).collect();
+                each.map(|each| each.iter().sum::<f64>() / each.len() as f64)
+            };
+            frames.filter_map(mean).collect()
+        };
+        let over = |pairs: &[(usize, usize)]| -> Vec<Vec<f64>> {
+            sequences.iter().map(|sequence| of_sequence(sequence, pairs)).collect()
+        };
+        let better = column.metric.higher_is_better();
+        let of_seeds = pairs.iter().map(|pair| Some(paired(&over(std::slice::from_ref(pair)), better)?.mean));
+        let over_seeds = of_seeds.collect::<Option<Vec<f64>>>().and_then(|means| spread(&means));
         MetricDifference {
             metric: column.metric,
             decimals: column.decimals(),
-            paired: paired(&sequences, column.metric.higher_is_better()),
+            paired: paired(&over(pairs), better),
+            over_seeds,
         }
     };
     columns.map(difference).collect()

@@ -1,7 +1,9 @@
 //! What a table says about where its numbers come from.
 
 use super::results::SequenceResults;
-use crate::experiment::{AvatarRecipe, Experiment, Options, PlannedTable, Profile, Source, Subset, Variant};
+use crate::experiment::{
+    AvatarRecipe, Capture, Experiment, Options, PlannedTable, Profile, Source, Subset, Variant,
+};
 
 /// The table's caption: of its own data, or the stand-in's, which does not name that data.
 pub(super) fn caption(experiment: &Experiment, source: Source) -> String {
@@ -27,7 +29,7 @@ pub(super) fn ran_on(
     let data = match (planned.source, &experiment.stand_in) {
         (Source::Own, _) => format!("Ran on: {names}"),
         (Source::StandIn, Some(stand_in)) => {
-            let kind = stand_in.capture.describe();
+            let kind = stand_in.capture.map_or("any capture", Capture::describe);
             format!(
                 "Ran on: {names}, a stand-in ({kind}); not the paper's data and not comparable with its numbers"
             )
@@ -40,6 +42,10 @@ pub(super) fn ran_on(
         profile(&options.profile, experiment),
         frames(sequences),
     ];
+    if experiment.seeds.len() > 1 {
+        let seeds: Vec<String> = experiment.seeds.iter().map(u64::to_string).collect();
+        sentences.push(format!("Mean ± standard deviation over the seeds {}", seeds.join(", ")));
+    }
     if !options.subset.is_everything() {
         sentences.push(subset(&options.subset));
     }

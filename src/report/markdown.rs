@@ -97,7 +97,7 @@ fn comparisons(comparisons: &[Comparison]) -> String {
     text
 }
 
-/// `+0.12 [+0.05, +0.20], won 83 %`.
+/// `+0.12 ± 0.03 over seeds [+0.05, +0.20], won 83 %`.
 fn difference(difference: &MetricDifference) -> String {
     let Some(paired) = difference.paired else { return "—".to_owned() };
     // One digit more than the table: differences are smaller than what they are differences of.
@@ -106,7 +106,11 @@ fn difference(difference: &MetricDifference) -> String {
         Some([low, high]) => format!(" [{}, {}]", signed(low), signed(high)),
         None => String::new(),
     };
-    format!("{}{interval}, won {:.0} %", signed(paired.mean), 100.0 * paired.win_rate)
+    let spread = match difference.over_seeds {
+        Some(sd) => format!(" ± {sd:.0$} over seeds", difference.decimals + 1),
+        None => String::new(),
+    };
+    format!("{}{spread}{interval}, won {:.0} %", signed(paired.mean), 100.0 * paired.win_rate)
 }
 
 /// Text that Markdown shows as it is, on one line.

@@ -92,8 +92,12 @@ pub struct MetricDifference {
     pub metric: MetricKind,
     /// Digits after the point.
     pub decimals: usize,
-    /// The difference; none if no frame was scored for both or one is infinite.
+    /// The difference; none if no frame was scored for both or one is infinite. With several seeds, frames are means over
+    /// them, each seed's variant compared with the same seed's baseline.
     pub paired: Option<Paired>,
+    /// Standard deviation of the mean difference over seeds; none from fewer than two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over_seeds: Option<f64>,
 }
 
 /// A metric column.
@@ -197,7 +201,10 @@ impl Content {
 pub struct Cell {
     /// What it holds, in full precision.
     pub content: Content,
-    /// As printed, before any markup: the rounded number, `∞`, `n/c` (not computed), `—`.
+    /// Standard deviation over the seeds that the content is the mean of; none from fewer than two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread: Option<f64>,
+    /// As printed, before any markup: the rounded number (and `± spread`), `∞`, `n/c` (not computed), `—`.
     pub text: String,
     /// Whether it is the best of its sequence, judged on the printed digits.
     pub best: bool,
@@ -216,7 +223,16 @@ impl Cell {
             Content::NotComputed => "n/c".to_owned(),
             Content::NotApplicable | Content::Missing => "—".to_owned(),
         };
-        Self { content, text, best: false, missing: 0, notes: Vec::new() }
+        Self { content, spread: None, text, best: false, missing: 0, notes: Vec::new() }
+    }
+
+    /// A mean over seeds, printed with its spread.
+    pub fn with_spread(content: Content, spread: Option<f64>, decimals: usize) -> Self {
+        let cell = Self::new(content, decimals);
+        match spread {
+            Some(sd) => Self { text: format!("{} ± {}", cell.text, round(sd, decimals)), spread, ..cell },
+            None => cell,
+        }
     }
 
     /// A difference, printed with its sign.
@@ -240,7 +256,7 @@ impl Cell {
     /// The value of the printed digits.
     pub fn printed(&self) -> Option<f64> {
         match self.content {
-            Content::Number(_) => self.text.parse().ok(),
+            Content::Number(_) => self.text.split(' ').next()?.parse().ok(),
             content => content.value(),
         }
     }

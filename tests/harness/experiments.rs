@@ -1,8 +1,8 @@
 //! Experiment files: the six tables against the transcription of the paper, a seventh, and what is refused.
 
-use super::made_up::{TABLE_7, figures, options, own_data, run, table_7};
+use super::made_up::{TABLE_7, figures, fitted_table_7, options, own_data, run, table_7};
 use super::support;
-use skinsplat::experiment::{AvatarRecipe, Capture, Experiment, Layout, Paper, Role, Source, plan};
+use skinsplat::experiment::{AvatarRecipe, Capture, Experiment, Layout, Paper, Role, Source, Variant, plan};
 use skinsplat::metrics::MetricKind;
 use skinsplat::report;
 use skinsplat::strategy::PRESETS;
@@ -133,7 +133,8 @@ fn the_tables_ask_what_the_paper_asks() {
             vec![None, Some("quaternion-average")],
         ]
     );
-    let captures: Vec<Capture> = experiments.iter().map(|e| e.stand_in.as_ref().unwrap().capture).collect();
+    let captures: Vec<Capture> =
+        experiments.iter().map(|e| e.stand_in.as_ref().unwrap().capture.unwrap()).collect();
     let (mono, multi, hands) = (Capture::Monocular, Capture::Multiview, Capture::Hands);
     assert_eq!(captures, [mono, mono, mono, multi, mono, hands]);
     for experiment in &experiments {
@@ -290,4 +291,22 @@ fn files_that_cannot_be_read_are_named() {
     std::fs::write(folder.path().join("bad.toml"), b"id = \"\xff\"").unwrap();
     let error = Experiment::load_folder(folder.path()).unwrap_err().to_string();
     assert!(error.contains("bad.toml"), "{error}");
+}
+
+#[test]
+fn seeds_repeat_every_fit() {
+    let seeded = fitted_table_7("seeds = [4, 7]").unwrap();
+    let ids: Vec<&str> = seeded.variants.iter().map(|v| v.id.as_str()).collect();
+    assert_eq!(ids, ["matrices-4", "quaternions-4", "matrices-7", "quaternions-7"]);
+    assert_eq!(seeded.baseline, "matrices-4");
+    let seed = |v: &Variant| match v.avatar {
+        AvatarRecipe::Fit { seed, .. } => seed,
+        _ => panic!("{}", v.id),
+    };
+    assert_eq!(seeded.variants.iter().map(seed).collect::<Vec<_>>(), [4, 4, 7, 7]);
+    assert_eq!(fitted_table_7("").unwrap().with_seeds(&[4, 7]).unwrap(), seeded, "given later, the same");
+    let own = seeded.with_seeds(&[1]).unwrap_err().to_string();
+    assert!(own.contains("seeds") && own.contains("[4, 7]"), "{own}");
+    let twice = fitted_table_7("seeds = [4, 4]").unwrap_err().to_string();
+    assert!(twice.contains("table7.toml") && twice.contains("each once"), "{twice}");
 }

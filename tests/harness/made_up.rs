@@ -14,6 +14,15 @@ pub(super) fn table_7() -> Experiment {
     Experiment::parse(TABLE_7, "table7.toml").unwrap()
 }
 
+/// The seventh table with fits in place of surfaces, and more keys.
+pub(super) fn fitted_table_7(keys: &str) -> Result<Experiment, skinsplat::experiment::Error> {
+    let text = TABLE_7
+        .replace("{ recipe = \"surface-vertex\" }", "{ recipe = \"fit\", name = \"pure-skinned\" }")
+        .replace("sequences = [", &format!("{keys}\nsequences = ["))
+        .replace("sh_degree = 1\n", "");
+    Experiment::parse(&text, "table7.toml")
+}
+
 /// The seventh table in the wide layout.
 pub(super) fn wide_table_7() -> Experiment {
     let text = TABLE_7.replace("layout = \"rows\"", "layout = \"wide\"").replace("\"Mean\"", "\"All\"");

@@ -99,7 +99,7 @@ fn avatars_are_shared_by_tables_that_make_the_same_ones() {
         "on mono's vertices and faces, on multi's vertices, on hands' fitted surface"
     );
     let swap = planned(&Experiment::embedded_all()[1..2], &[figures()]);
-    assert_eq!(swap.avatars.len(), 5, "five fits, drawn 25 times");
+    assert_eq!(swap.avatars.len(), 5 * 3 * 3, "five fits of three subjects with three seeds");
     let known: BTreeSet<&str> = plan.avatars.iter().map(|avatar| avatar.key.as_str()).collect();
     assert!(plan.jobs.iter().flat_map(|job| &job.variants).all(|v| known.contains(v.avatar.as_str())));
 }

@@ -1,6 +1,8 @@
 //! Reports: what is missing, what is documented, what moved.
 
-use super::made_up::{figures, options, results, run, table, table_7, with_holes};
+use super::made_up::{
+    figures, fitted_table_7, options, results, run, score, scored, table, table_7, with_holes,
+};
 use skinsplat::experiment::{Experiment, Outcome, Records, Source, plan};
 use skinsplat::metrics::MetricKind;
 use skinsplat::report::compare::{Tolerances, Verdict, compare};
@@ -215,4 +217,37 @@ fn lost_frames_are_worse_and_new_ones_are_not() {
     let mut other = full.clone();
     other.tables[0].experiment = "table8".into();
     assert_eq!(compare(&empty, &other, &Tolerances::NONE).verdict, Verdict::NothingCompared);
+}
+
+/// PSNR of `matrices` 30 and 32 dB with the two seeds, of `quaternions` 1 and 3 dB more.
+#[test]
+fn seeds_are_one_row_with_a_spread() {
+    let table = table(&fitted_table_7("seeds = [0, 1]").unwrap(), |plan| {
+        let mut records = Records::new();
+        for job in &plan.jobs {
+            for (variant, psnr) in job.variants.iter().zip([30.0, 31.0, 32.0, 35.0]) {
+                let score = score(&job.protocol, psnr, 0.9, Some(0.1));
+                records.insert(variant.key.clone(), scored(&variant.key, score));
+            }
+        }
+        records
+    });
+    let cell = |kind, variant: &str| {
+        let of = |row: &&skinsplat::report::Row| row.kind == kind && row.labels[1] == variant;
+        table.rows.iter().find(of).unwrap().cells[0].clone()
+    };
+    for kind in [RowKind::Measured, RowKind::Mean] {
+        assert_eq!(cell(kind, "Matrices").text, "31.00 ± 1.41");
+        let quaternions = cell(kind, "Quaternions");
+        assert_eq!((quaternions.text.as_str(), quaternions.best), ("33.00 ± 2.83", true));
+    }
+    let comparison = table.comparisons.last().unwrap();
+    let psnr = &comparison.differences[0];
+    assert_eq!((comparison.variant.as_str(), comparison.baseline.as_str()), ("Quaternions", "Matrices"));
+    assert_eq!(psnr.paired.unwrap().mean, 2.0);
+    assert!((psnr.over_seeds.unwrap() - 2.0_f64.sqrt()).abs() < 1e-12);
+    let markdown = report::markdown(&table);
+    assert!(markdown.contains("+2.000 ± 1.414 over seeds"), "{markdown}");
+    assert!(markdown.contains("over the seeds 0, 1"), "{markdown}");
+    assert!(report::csv(&table).lines().next().unwrap().contains("psnr sd"));
 }
