@@ -17,7 +17,7 @@ pub use pattern::SamplePattern;
 pub use setup::NEAR_PLANE;
 pub use texture::Texture;
 
-use crate::scene::{Camera, Image, Mask, Rendered, SceneError};
+use crate::scene::{Camera, Image, Mask, Rendered, SceneError, Underlay};
 use glam::Vec3;
 use raster::PixelSamples;
 use rayon::prelude::*;
@@ -93,6 +93,11 @@ impl Drawing {
             *z *= a;
         }
         Rendered { image, alpha: self.coverage.clone(), depth }
+    }
+
+    /// The drawing as a layer among Gaussians.
+    pub fn underlay(&self) -> Underlay<'_> {
+        Underlay { colour: &self.colour, coverage: &self.coverage, depth: &self.depth }
     }
 }
 
