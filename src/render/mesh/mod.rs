@@ -8,11 +8,13 @@
 //! values that the closure returns. Both sides of a triangle are drawn. Pixels are independent: the result is the same,
 //! bit for bit, for any number of threads.
 
+mod adjoint;
 mod pattern;
 mod raster;
 mod setup;
 mod texture;
 
+pub use adjoint::texture_gradient;
 pub use pattern::SamplePattern;
 pub use setup::NEAR_PLANE;
 pub use texture::Texture;
