@@ -6,6 +6,7 @@ use super::progress::Watch;
 use super::{Context, Exit};
 use crate::data::{Sequence, Subject};
 use crate::experiment::{FitOptions, Profile, Recipe, evenly_spaced};
+use crate::fit::train::Fitted;
 use crate::run::Error;
 use crate::run::fitting::{self, FitEvent, FitFiles, FitReport, HeldOut};
 use crate::run::held_out::held_out;
@@ -84,18 +85,20 @@ impl Fit {
             match event {
                 FitEvent::Starting => watch.start("start", 1),
                 FitEvent::Warning(text) => watch.above(&format!("warning: {text}"), context.quiet),
-                FitEvent::Step(step, avatar) => {
+                FitEvent::Step(step, fitted) => {
                     watch.fitting(step);
                     let done = step.iteration;
                     if done < step.iterations && self.test_every.is_some_and(|every| done % every == 0) {
-                        scores.extend(score(&tests, avatar, strategy, done)?);
+                        scores.extend(score(&tests, fitted, strategy, done)?);
                     }
                 }
             }
             Ok(())
         })?;
         let avatar = crate::data::ply::read_avatar(&self.out)?;
-        scores.extend(score(&tests, &avatar, strategy, options.iterations)?);
+        let mesh = options.recipe.mesh.as_ref().map(|_| files.mesh().read(&training.body)).transpose()?;
+        let fitted = Fitted { avatar: &avatar, mesh: mesh.as_ref() };
+        scores.extend(score(&tests, fitted, strategy, options.iterations)?);
         report.held_out = scores;
         fitting::write_report(&files.sidecar(), &report)?;
         drop(watch);
@@ -174,9 +177,9 @@ impl Fit {
 /// The scores of an avatar on all test sequences.
 fn score(
     tests: &[Sequence],
-    avatar: &crate::scene::Avatar,
+    fitted: Fitted<'_>,
     strategy: Strategy,
     iteration: u32,
 ) -> Result<Vec<HeldOut>, Error> {
-    tests.iter().map(|sequence| held_out(avatar, &strategy, sequence, iteration)).collect()
+    tests.iter().map(|sequence| held_out(fitted, &strategy, sequence, iteration)).collect()
 }

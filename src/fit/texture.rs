@@ -6,7 +6,7 @@ use super::surface;
 use super::{Error, clothing, training};
 use crate::data::sequence::Sequence;
 use crate::math::sh;
-use crate::render::mesh::{Mesh, SamplePattern, Texture, draw, visible_faces};
+use crate::render::mesh::{Drawing, Mesh, SamplePattern, Texture, draw, texture_gradient, visible_faces};
 use crate::scene::{Camera, Image, Pose, PosedBody, Rendered, RestBody, SceneError, Uv};
 use glam::{DMat4, Vec3};
 use rayon::prelude::*;
@@ -27,7 +27,7 @@ impl TexturedBody {
     /// Draws the body in a pose, over a background.
     ///
     /// # Errors
-    /// A camera that breaks an invariant, or a pose for another body.
+    /// As [`TexturedBody::drawing`].
     pub fn draw(
         &self,
         pose: &Pose,
@@ -35,11 +35,45 @@ impl TexturedBody {
         pattern: SamplePattern,
         background: [f32; 3],
     ) -> Result<Rendered, SceneError> {
+        Ok(self.drawing(pose, camera, pattern)?.over(background))
+    }
+
+    /// Draws the body in a pose.
+    ///
+    /// # Errors
+    /// A camera that breaks an invariant, or a pose for another body.
+    pub fn drawing(
+        &self,
+        pose: &Pose,
+        camera: &Camera,
+        pattern: SamplePattern,
+    ) -> Result<Drawing, SceneError> {
         let posed = PosedBody::new(&self.body, pose)?;
         let mesh = Mesh::new(&posed.mesh().vertices, &self.body.faces)?;
-        Ok(draw(&mesh, camera, pattern, self.texture.shader(&self.uv))?.over(background))
+        draw(&mesh, camera, pattern, self.texture.shader(&self.uv))
+    }
+
+    /// The derivatives of a loss with respect to the texels ([`texture_gradient`]), from those with respect to the colours
+    /// of [`TexturedBody::drawing`].
+    ///
+    /// # Errors
+    /// As [`TexturedBody::drawing`].
+    pub fn backward(
+        &self,
+        pose: &Pose,
+        camera: &Camera,
+        pattern: SamplePattern,
+        upstream: &Image,
+        gradient: &mut Image,
+    ) -> Result<(), SceneError> {
+        let posed = PosedBody::new(&self.body, pose)?;
+        let mesh = Mesh::new(&posed.mesh().vertices, &self.body.faces)?;
+        texture_gradient(&mesh, camera, pattern, &self.uv, upstream, gradient)
     }
 }
+
+/// Samples per pixel side with which textured bodies are drawn: 16 samples on a rotated grid.
+pub const SAMPLES: usize = 4;
 
 /// The largest side of a texture, texels.
 pub const MAX_SIZE: u32 = 8192;

@@ -1,17 +1,14 @@
 //! Avatars that jobs need: built from training frames once, kept in the run's folder, read back bit for bit.
 
 use super::fitting::{self, FitEvent, FitFiles};
+use super::textured::TexturedFiles;
 use super::{Error, Event, Library};
-use crate::data::{Sequence, frames, npy, ply};
+use crate::data::{Sequence, ply};
 use crate::experiment::{AvatarBuild, AvatarRecipe, PlannedFit};
 use crate::fit::surface::{BindTo, Placement, SurfaceInit, surface_init};
 use crate::fit::texture::{TextureInit, TexturedBody, gather_texture};
-use crate::render::mesh::Texture;
-use crate::scene::RestBody;
 use crate::strategy::BoundAvatar;
-use glam::DVec3;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// An avatar that is ready to be posed.
 #[derive(Debug)]
@@ -20,6 +17,8 @@ pub enum Prepared {
     Gaussians(Box<BoundAvatar>),
     /// The body's mesh under a texture.
     Textured(TexturedBody),
+    /// Both, drawn together.
+    Hybrid(Box<BoundAvatar>, TexturedBody),
 }
 
 /// Reads an avatar from the run's folder, or builds it and keeps it there. Whether it was kept makes no difference to a
@@ -47,8 +46,14 @@ pub fn prepare(
         let avatar = surface_init(&sequence, &surface_options(build))?;
         ply::write_avatar(&file, &avatar, &ply::Metadata::default(), ply::Encoding::LittleEndian)?;
     }
-    let bound = BoundAvatar::new(&ply::read_avatar(&file)?, &sequence.body)?;
-    Ok(Prepared::Gaussians(Box::new(bound)))
+    let bound = Box::new(BoundAvatar::new(&ply::read_avatar(&file)?, &sequence.body)?);
+    let mesh = build.fit.as_ref().and_then(|planned| planned.options.recipe.mesh.as_ref());
+    Ok(match mesh {
+        Some(_) => {
+            Prepared::Hybrid(bound, FitFiles { avatar: file, start: None }.mesh().read(&sequence.body)?)
+        }
+        None => Prepared::Gaussians(bound),
+    })
 }
 
 /// Fits an avatar into `file`.
@@ -93,22 +98,11 @@ fn kept(build: &AvatarBuild, folder: &Path) -> PathBuf {
 
 /// A textured body: its texture in `file`, its dressed vertices beside it.
 fn textured(sequence: &Sequence, size: u32, file: &Path) -> Result<TexturedBody, Error> {
-    let vertex_file = file.with_extension("vertices.npy");
-    if !(file.is_file() && vertex_file.is_file()) {
-        let made = gather_texture(sequence, &TextureInit { size, ..TextureInit::default() })?;
-        let vertices = made.body.vertices.iter().flat_map(|v| v.as_vec3().to_array());
-        npy::write_f32(&vertex_file, &[made.body.vertices.len(), 3], vertices)?;
-        frames::save_npy(file, made.texture.image())?;
+    let files = TexturedFiles { texture: file.to_owned(), vertices: file.with_extension("vertices.npy") };
+    if !files.exist() {
+        files.write(&gather_texture(sequence, &TextureInit { size, ..TextureInit::default() })?)?;
     }
-    let (image, _) = frames::load_image(file)?;
-    let vertices: Vec<DVec3> =
-        npy::read(&vertex_file)?.values.chunks_exact(3).map(DVec3::from_slice).collect();
-    let bare = &*sequence.body;
-    let body = RestBody { vertices, ..bare.clone() };
-    body.validate()?;
-    let no_uv = || Error::Absent { name: "texture coordinates of the body".to_owned() };
-    let uv = bare.uv.clone().ok_or_else(no_uv)?;
-    Ok(TexturedBody { body: Arc::new(body), uv, texture: Texture::new(image) })
+    files.read(&sequence.body)
 }
 
 fn surface_options(build: &AvatarBuild) -> SurfaceInit {

@@ -2,9 +2,10 @@
 //! was made.
 
 use super::Error;
+use super::textured::TexturedFiles;
 use crate::data::{Sequence, atomic, ply};
 use crate::experiment::{CodeVersions, FitOptions};
-use crate::fit::train::{self, Checkpoint, Step, Trainer};
+use crate::fit::train::{self, Checkpoint, Fitted, Step, Trainer};
 use crate::scene::Avatar;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
@@ -36,6 +37,14 @@ impl FitFiles {
     /// The sidecar beside the avatar.
     pub fn sidecar(&self) -> PathBuf {
         self.avatar.with_extension("json")
+    }
+
+    /// The mesh of a hybrid, beside the avatar.
+    pub fn mesh(&self) -> TexturedFiles {
+        TexturedFiles {
+            texture: self.avatar.with_extension("texture.png"),
+            vertices: self.avatar.with_extension("vertices.npy"),
+        }
     }
 }
 
@@ -83,7 +92,7 @@ pub enum FitEvent<'a> {
     /// The avatar with which it starts is being made.
     Starting,
     /// An iteration is done; the avatar as it stands.
-    Step(Step, &'a Avatar),
+    Step(Step, Fitted<'a>),
     /// Something is wrong with the data, but not fatally.
     Warning(&'a str),
 }
@@ -117,7 +126,7 @@ pub fn fit(
             progress.note_warning(warning);
         }
         progress.note(step);
-        watch(FitEvent::Step(step, trainer.avatar()))?;
+        watch(FitEvent::Step(step, trainer.fitted()))?;
         if trainer.is_resting() && saved.elapsed() > BETWEEN_CHECKPOINTS {
             progress.save(&path, trainer.checkpoint())?;
             saved = Instant::now();
@@ -135,6 +144,9 @@ pub fn fit(
         warnings: progress.warnings,
     };
     write_report(&files.sidecar(), &report)?;
+    if let Some(mesh) = trainer.fitted().mesh {
+        files.mesh().write(mesh)?;
+    }
     let metadata = ply::Metadata::default();
     ply::write_avatar(&files.avatar, trainer.avatar(), &metadata, ply::Encoding::LittleEndian)?;
     if path.is_file() {

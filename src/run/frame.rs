@@ -4,15 +4,13 @@ use super::Error;
 use super::avatars::Prepared;
 use crate::data::{Sequence, Truth};
 use crate::experiment::{Job, JobVariant, Seconds};
+use crate::fit::texture::{SAMPLES, TexturedBody};
 use crate::metrics::Protocol;
 use crate::render::mesh::SamplePattern;
 use crate::render::splat::{RenderSettings, Renderer};
-use crate::scene::{Camera, Image, Pose, PosedBody};
+use crate::scene::{Camera, Image, Mask, Pose, Posed, PosedBody, Rendered};
 use crate::strategy::{self, Strategy};
 use std::time::Instant;
-
-/// Samples per pixel side with which textured meshes are drawn: 16 samples on a rotated grid.
-const MESH_SAMPLES: usize = 4;
 
 /// A frame, loaded.
 pub(super) struct Frame<'a> {
@@ -40,15 +38,16 @@ impl<'a> Frame<'a> {
         seconds: &mut Seconds,
     ) -> Result<Drawn, Error> {
         let background = background(job)?;
-        let bound = match avatar {
+        let (bound, mesh) = match avatar {
             Prepared::Textured(textured) => {
                 let start = Instant::now();
-                let pattern = SamplePattern::new(MESH_SAMPLES);
+                let pattern = SamplePattern::new(SAMPLES);
                 let image = textured.draw(self.pose, self.camera, pattern, background)?.image;
                 seconds.render = start.elapsed().as_secs_f64();
                 return Ok(Drawn { image, splats: None, visible_splats: None });
             }
-            Prepared::Gaussians(bound) => bound,
+            Prepared::Gaussians(bound) => (bound, None),
+            Prepared::Hybrid(bound, mesh) => (bound, Some(mesh)),
         };
         let strategy: Strategy = variant.strategy.as_deref().unwrap_or_default().parse()?;
         let start = Instant::now();
@@ -56,11 +55,30 @@ impl<'a> Frame<'a> {
         seconds.pose = start.elapsed().as_secs_f64();
         let settings = RenderSettings { background, antialiased: job.antialiased };
         let start = Instant::now();
-        let image = renderer.render(&posed, self.camera, &settings).image;
+        let image = match mesh {
+            None => renderer.render(&posed, self.camera, &settings).image,
+            Some(mesh) => together(renderer, &posed, (mesh, self.pose), self.camera, &settings)?.image,
+        };
         seconds.render = start.elapsed().as_secs_f64();
         let (splats, visible) = (posed.len() as u64, renderer.visible() as u64);
         Ok(Drawn { image, splats: Some(splats), visible_splats: Some(visible) })
     }
+}
+
+/// Gaussians and a textured mesh in a pose, drawn together.
+pub(super) fn together(
+    renderer: &mut Renderer,
+    posed: &Posed<'_>,
+    (mesh, pose): (&TexturedBody, &Pose),
+    camera: &Camera,
+    settings: &RenderSettings,
+) -> Result<Rendered, Error> {
+    let drawing = mesh.drawing(pose, camera, SamplePattern::new(SAMPLES))?;
+    let empty = || Mask::filled(1, 1, 0.0);
+    let mut rendered = Rendered { image: Image::filled(1, 1, [0.0; 3]), alpha: empty(), depth: empty() };
+    let mut shown = empty();
+    renderer.render_over(posed, camera, settings, &drawing.underlay(), &mut rendered, &mut shown);
+    Ok(rendered)
 }
 
 /// What a variant looks like.

@@ -2,10 +2,12 @@
 
 use super::Error;
 use super::fitting::HeldOut;
+use super::frame::together;
 use crate::data::Sequence;
+use crate::fit::train::Fitted;
 use crate::metrics::{self, Protocol};
 use crate::render::splat::{RenderSettings, Renderer};
-use crate::scene::{Avatar, PosedBody};
+use crate::scene::PosedBody;
 use crate::strategy::{BoundAvatar, Strategy, pose};
 use rayon::prelude::*;
 
@@ -13,8 +15,8 @@ use rayon::prelude::*;
 ///
 /// # Errors
 /// A frame that cannot be read or scored, an avatar that does not fit the sequence's body.
-pub fn held_out(
-    avatar: &Avatar,
+pub fn held_out<'a>(
+    fitted: impl Into<Fitted<'a>>,
     strategy: &Strategy,
     sequence: &Sequence,
     iteration: u32,
@@ -22,13 +24,18 @@ pub fn held_out(
     let protocol = Protocol::parse("default")?;
     let background = protocol.background_colour().unwrap_or([1.0; 3]);
     let settings = RenderSettings { background, antialiased: false };
+    let Fitted { avatar, mesh } = fitted.into();
     let bound = BoundAvatar::new(avatar, &sequence.body)?;
     let score = |renderer: &mut Renderer, index: usize| {
         let truth = sequence.truth(index)?;
         let frame = &sequence.frames[index];
-        let body = PosedBody::new(&sequence.body, &sequence.poses[frame.pose])?;
+        let (body_pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
+        let body = PosedBody::new(&sequence.body, body_pose)?;
         let posed = pose(&bound, &body, strategy)?;
-        let image = renderer.render(&posed, &sequence.cameras[frame.camera], &settings).image;
+        let image = match mesh {
+            None => renderer.render(&posed, camera, &settings).image,
+            Some(mesh) => together(renderer, &posed, (mesh, body_pose), camera, &settings)?.image,
+        };
         Ok(protocol.score(&image, metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha })?)
     };
     let frames = (0..sequence.frames.len()).into_par_iter();

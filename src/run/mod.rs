@@ -14,6 +14,7 @@ pub mod held_out;
 mod library;
 pub mod provenance;
 pub mod store;
+pub mod textured;
 
 pub use error::Error;
 pub use execute::{Event, execute};

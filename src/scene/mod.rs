@@ -15,7 +15,7 @@ pub use camera::Camera;
 pub use gradient::{AvatarGradient, PosedGradient, RenderedGradient};
 pub use image::{Image, Mask};
 pub use pose::{LocalTransform, Pose};
-pub use posed::{ColourClamp, Posed, Rendered};
+pub use posed::{ColourClamp, Posed, Rendered, Underlay};
 pub use skin_weights::SkinWeights;
 
 /// A scene value that breaks an invariant. `field` names the part, `expected` says what it should have been; the data

@@ -85,3 +85,15 @@ pub struct Rendered {
     /// Σ z α T, the alpha-weighted camera depth in metres (no background term); divide by `alpha` for the mean depth.
     pub depth: super::Mask,
 }
+
+/// An opaque layer among the Gaussians: per pixel a colour, how much of the pixel it covers, and how far away it is.
+/// What the triangle rasterizer draws of a mesh, for the splat renderer to draw with. All three have one size.
+#[derive(Clone, Copy, Debug)]
+pub struct Underlay<'a> {
+    /// Straight (un-premultiplied) colour.
+    pub colour: &'a Image,
+    /// The covered fraction of each pixel, 0 to 1.
+    pub coverage: &'a super::Mask,
+    /// Camera depth, metres, where anything is covered. A NaN lies behind all Gaussians.
+    pub depth: &'a super::Mask,
+}

@@ -17,6 +17,61 @@ struct Splat {
     pixels: [f64; 4],
 }
 
+/// What a pixel shows besides Gaussians.
+#[derive(Clone, Copy)]
+pub struct Pane {
+    pub colour: DVec3,
+    pub coverage: f64,
+    pub depth: f64,
+}
+
+/// The Gaussians that a pixel blends, front to back, and how many of them lie in front of its pane.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parted {
+    pub chosen: Vec<usize>,
+    pub front: usize,
+}
+
+/// [`chosen`] with a pane in every pixel.
+pub fn parted(posed: &Posed, camera: &Camera, settings: &RenderSettings, panes: &[Pane]) -> Vec<Parted> {
+    let splats = sorted(posed, camera, settings);
+    std::iter::zip(pixels(camera), panes).map(|(pixel, pane)| part(&splats, pixel, pane)).collect()
+}
+
+/// [`render_chosen`] with a pane in every pixel.
+pub fn render_parted(
+    posed: &Posed,
+    camera: &Camera,
+    settings: &RenderSettings,
+    panes: &[Pane],
+    parted: &[Parted],
+) -> Vec<[f64; 5]> {
+    let splats: Vec<Option<Splat>> = (0..posed.len()).map(|i| project(posed, i, camera, settings)).collect();
+    let background = DVec3::from_array(settings.background.map(f64::from));
+    std::iter::zip(pixels(camera), std::iter::zip(panes, parted))
+        .map(|(pixel, (pane, Parted { chosen, front }))| {
+            let of = |chosen: &[usize]| -> Vec<&Splat> {
+                chosen.iter().map(|&i| splats[i].as_ref().unwrap()).collect()
+            };
+            let behind = blend(of(&chosen[*front..]).into_iter(), pixel, background);
+            let through = |c: usize, own: f64| own * pane.coverage + behind[c] * (1.0 - pane.coverage);
+            let [r, g, b] = [0, 1, 2].map(|c| through(c, pane.colour[c]));
+            let (alpha, depth) = (through(3, 1.0), through(4, pane.depth));
+            let front = blend(of(&chosen[..*front]).into_iter(), pixel, DVec3::new(r, g, b));
+            let left = 1.0 - front[3];
+            [front[0], front[1], front[2], front[3] + left * alpha, front[4] + left * depth]
+        })
+        .collect()
+}
+
+/// In drawing order.
+fn sorted(posed: &Posed, camera: &Camera, settings: &RenderSettings) -> Vec<Splat> {
+    let mut splats: Vec<Splat> =
+        (0..posed.len()).filter_map(|i| project(posed, i, camera, settings)).collect();
+    splats.sort_by(|a, b| (a.depth as f32).total_cmp(&(b.depth as f32)));
+    splats
+}
+
 /// Colour over the background, alpha and depth of every pixel, row by row.
 pub fn render(posed: &Posed, camera: &Camera, settings: &RenderSettings) -> Vec<[f64; 5]> {
     render_chosen(posed, camera, settings, &chosen(posed, camera, settings))
@@ -24,10 +79,9 @@ pub fn render(posed: &Posed, camera: &Camera, settings: &RenderSettings) -> Vec<
 
 /// The Gaussians that every pixel blends, front to back.
 pub fn chosen(posed: &Posed, camera: &Camera, settings: &RenderSettings) -> Vec<Vec<usize>> {
-    let mut splats: Vec<Splat> =
-        (0..posed.len()).filter_map(|i| project(posed, i, camera, settings)).collect();
-    splats.sort_by(|a, b| (a.depth as f32).total_cmp(&(b.depth as f32)));
-    pixels(camera).map(|pixel| choose(&splats, pixel)).collect()
+    let splats = sorted(posed, camera, settings);
+    let nothing = Pane { colour: DVec3::ZERO, coverage: 0.0, depth: f64::INFINITY };
+    pixels(camera).map(|pixel| part(&splats, pixel, &nothing).chosen).collect()
 }
 
 /// [`render`] with every pixel blending the Gaussians that it is told to: smooth in all parameters.
@@ -60,9 +114,17 @@ impl Splat {
     }
 }
 
-fn choose(splats: &[Splat], pixel: DVec2) -> Vec<usize> {
+fn part(splats: &[Splat], pixel: DVec2, pane: &Pane) -> Parted {
     let (mut transmittance, mut chosen) = (1.0, Vec::new());
+    let mut front = None;
     for splat in splats {
+        if front.is_none() && splat.depth as f32 >= pane.depth as f32 {
+            front = Some(chosen.len());
+            transmittance *= 1.0 - pane.coverage;
+            if transmittance < 1e-4 {
+                break;
+            }
+        }
         let [x0, x1, y0, y1] = splat.pixels;
         if pixel.x < x0 || pixel.x >= x1 || pixel.y < y0 || pixel.y >= y1 {
             continue;
@@ -78,7 +140,7 @@ fn choose(splats: &[Splat], pixel: DVec2) -> Vec<usize> {
         transmittance = after;
         chosen.push(splat.index);
     }
-    chosen
+    Parted { front: front.unwrap_or(chosen.len()), chosen }
 }
 
 fn blend<'a>(splats: impl Iterator<Item = &'a Splat>, pixel: DVec2, background: DVec3) -> [f64; 5] {

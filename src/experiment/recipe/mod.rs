@@ -42,6 +42,9 @@ pub struct Recipe {
     /// How Gaussians come and go; their number is fixed if absent.
     #[serde(default)]
     pub densify: Option<Densify>,
+    /// A textured mesh that is drawn with the Gaussians; none if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<MeshLayer>,
 }
 
 /// A recipe with a budget.
@@ -224,6 +227,17 @@ pub struct LossTerms {
     pub displacement: f32,
 }
 
+/// A textured mesh that is drawn with the Gaussians (HAHA): the body, its vertices moved onto the outlines in the masks,
+/// under a texture that is gathered from the training frames and then fitted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshLayer {
+    /// Side of the texture, texels.
+    pub texture: u32,
+    /// Learning rate of the texels' colours; 0 leaves them as gathered.
+    pub rate: f32,
+}
+
 /// How Gaussians come and go: adaptive density control of 3DGS, on a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -320,6 +334,14 @@ impl Recipe {
         }
         if super::catalog::strategy(&self.strategy).is_err() {
             return refuse("strategy", format!("`{}`", self.strategy), "the id or spec of a strategy");
+        }
+        if let Some(mesh) = &self.mesh {
+            if mesh.texture == 0 {
+                return refuse("mesh.texture", mesh.texture.to_string(), "at least 1 texel");
+            }
+            if !(mesh.rate.is_finite() && mesh.rate >= 0.0) {
+                return refuse("mesh.rate", mesh.rate.to_string(), "a finite number, at least 0");
+            }
         }
         self.densify.as_ref().map_or(Ok(()), |densify| densify.check(&self.id))
     }

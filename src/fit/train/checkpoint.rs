@@ -1,6 +1,7 @@
 //! The state of a fit between two iterations.
 
 use super::density::Density;
+use super::layer::State;
 use super::parameters::Parameters;
 use crate::data::sequence::Sequence;
 use crate::experiment::{CodeVersions, FitOptions, content_key};
@@ -15,6 +16,8 @@ pub struct Checkpoint {
     pub(super) iteration: u32,
     pub(super) parameters: Parameters,
     pub(super) density: Density,
+    /// Of the mesh that is drawn with the Gaussians.
+    pub(super) layer: Option<State>,
 }
 
 impl Checkpoint {
@@ -23,9 +26,10 @@ impl Checkpoint {
         options: &FitOptions,
         parameters: Parameters,
         density: Density,
+        layer: Option<State>,
         iteration: u32,
     ) -> Self {
-        Self { key: key(sequence, options), iteration, parameters, density }
+        Self { key: key(sequence, options), iteration, parameters, density, layer }
     }
 
     /// Iterations done.

@@ -8,6 +8,7 @@
 mod checkpoint;
 mod density;
 mod frames;
+mod layer;
 mod parameters;
 mod regularise;
 mod walk;
@@ -18,10 +19,12 @@ use super::Error;
 use super::loss::{FrameLoss, Losses, Weights};
 use super::shape::{Ended, ShapeFit, fit_shape};
 use super::surface::{SurfaceInit, surface_init};
+use super::texture::TexturedBody;
 use crate::data::sequence::Sequence;
 use crate::experiment::FitOptions;
 use crate::experiment::recipe::{FitBackground, Surface};
 use crate::math::random::SplitMix64;
+use crate::render::mesh::Drawing;
 use crate::render::splat::{Derivatives, RenderSettings, Renderer};
 use crate::scene::{
     Avatar, AvatarGradient, Binding, Image, Mask, PosedBody, PosedGradient, Rendered, RenderedGradient,
@@ -30,6 +33,7 @@ use crate::scene::{
 use crate::strategy::{BoundAvatar, Strategy, pose, pose_backward};
 use density::Density;
 use frames::TrainingFrames;
+use layer::Layer;
 use parameters::{Parameters, RatesNow};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -53,6 +57,21 @@ pub struct Step {
     pub splats: usize,
 }
 
+/// An avatar as a fit leaves it.
+#[derive(Clone, Copy, Debug)]
+pub struct Fitted<'a> {
+    /// The Gaussians.
+    pub avatar: &'a Avatar,
+    /// The mesh that is drawn with them, of a hybrid.
+    pub mesh: Option<&'a TexturedBody>,
+}
+
+impl<'a> From<&'a Avatar> for Fitted<'a> {
+    fn from(avatar: &'a Avatar) -> Self {
+        Self { avatar, mesh: None }
+    }
+}
+
 /// An optimisation in progress.
 pub struct Trainer<'a> {
     sequence: &'a Sequence,
@@ -60,6 +79,7 @@ pub struct Trainer<'a> {
     strategy: Strategy,
     parameters: Parameters,
     density: Density,
+    layer: Option<Layer>,
     iteration: u32,
     bound: BoundAvatar,
     frames: TrainingFrames<'a>,
@@ -120,15 +140,17 @@ pub fn start(sequence: &Sequence, options: &FitOptions) -> Result<Avatar, Error>
 }
 
 impl<'a> Trainer<'a> {
-    /// Prepares the first iteration on an avatar, usually that of [`start`].
+    /// Prepares the first iteration on an avatar, usually that of [`start`]. The mesh of a hybrid is made here.
     ///
     /// # Errors
-    /// An avatar or body that breaks an invariant, a recipe that does not suit it, a sequence without frames.
+    /// An avatar or body that breaks an invariant, a recipe that does not suit it, a sequence without frames; as
+    /// [`gather_texture`](super::texture::gather_texture) for a hybrid.
     pub fn new(sequence: &'a Sequence, options: &'a FitOptions, avatar: Avatar) -> Result<Self, Error> {
         let edge = mean_edge(&sequence.body);
         let parameters = Parameters::new(avatar, edge, &options.recipe.free);
         let density = Density::new(parameters.len());
-        Self::with_state(sequence, options, parameters, density, 0)
+        let layer = options.recipe.mesh.as_ref().map(|mesh| Layer::new(sequence, mesh)).transpose()?;
+        Self::with_state(sequence, options, (parameters, density, layer), 0)
     }
 
     /// Goes on from a checkpoint of the same sequence and options.
@@ -140,15 +162,19 @@ impl<'a> Trainer<'a> {
         options: &'a FitOptions,
         checkpoint: Checkpoint,
     ) -> Result<Self, Error> {
-        let Checkpoint { parameters, density, iteration, .. } = checkpoint.matching(sequence, options)?;
-        Self::with_state(sequence, options, parameters, density, iteration)
+        let Checkpoint { parameters, density, layer, iteration, .. } =
+            checkpoint.matching(sequence, options)?;
+        let layer = match (&options.recipe.mesh, layer) {
+            (Some(mesh), Some(state)) => Some(Layer::resume(sequence, mesh, state)?),
+            _ => None,
+        };
+        Self::with_state(sequence, options, (parameters, density, layer), iteration)
     }
 
     fn with_state(
         sequence: &'a Sequence,
         options: &'a FitOptions,
-        parameters: Parameters,
-        density: Density,
+        (parameters, density, layer): (Parameters, Density, Option<Layer>),
         iteration: u32,
     ) -> Result<Self, Error> {
         options
@@ -168,6 +194,7 @@ impl<'a> Trainer<'a> {
             strategy,
             parameters,
             density,
+            layer,
             iteration,
             bound,
             frames: TrainingFrames::new(sequence, options.seed),
@@ -192,6 +219,11 @@ impl<'a> Trainer<'a> {
         &self.parameters.avatar
     }
 
+    /// The avatar as it stands, with its mesh.
+    pub fn fitted(&self) -> Fitted<'_> {
+        Fitted { avatar: self.avatar(), mesh: self.layer.as_ref().map(|layer| &layer.textured) }
+    }
+
     /// Warnings since they were last taken.
     pub fn take_warnings(&mut self) -> Vec<String> {
         std::mem::take(&mut self.warnings)
@@ -204,6 +236,7 @@ impl<'a> Trainer<'a> {
             self.options,
             self.parameters.clone(),
             self.density.clone(),
+            self.layer.as_ref().map(Layer::state),
             self.iteration,
         )
     }
@@ -228,21 +261,41 @@ impl<'a> Trainer<'a> {
         let background = background(recipe.background, self.options.seed, self.iteration);
         let settings = RenderSettings { background, antialiased: false };
         let scratch = &mut self.scratch;
-        scratch.renderer.render_into(&posed, frame.camera, &settings, &mut scratch.rendered);
+        let in_scene = Error::scene(self.sequence);
+        let drawing = self.layer.as_ref().map(|layer| layer.draw(frame.pose, frame.camera));
+        let drawing = drawing.transpose().map_err(&in_scene)?;
+        let underlay = drawing.as_ref().map(Drawing::underlay);
+        let Scratch { renderer, rendered, .. } = scratch;
+        match (&underlay, &mut self.layer) {
+            (Some(underlay), Some(layer)) => {
+                let shown = &mut layer.shown;
+                renderer.render_over(&posed, frame.camera, &settings, underlay, rendered, shown);
+            }
+            _ => renderer.render_into(&posed, frame.camera, &settings, rendered),
+        }
         composite(&frame.truth.rgb, &frame.truth.alpha, background, &mut scratch.truth);
         let Rendered { image, alpha, .. } = &scratch.rendered;
         let weights = Weights { ssim: recipe.loss.ssim, silhouette: recipe.loss.silhouette };
         let truth = (&scratch.truth, &frame.truth.alpha);
         let loss = scratch.losses.frame((image, alpha), truth, &weights, &mut scratch.of_rendered);
-        scratch.renderer.backward(
-            &posed,
-            frame.camera,
-            &settings,
-            &scratch.rendered,
-            &scratch.of_rendered,
-            Derivatives::Exact,
-            &mut scratch.of_posed,
-        );
+        let Scratch { renderer, rendered, of_rendered, of_posed, .. } = scratch;
+        let (camera, exact) = (frame.camera, Derivatives::Exact);
+        match &underlay {
+            Some(underlay) => renderer.backward_over(
+                &posed,
+                camera,
+                &settings,
+                underlay,
+                rendered,
+                of_rendered,
+                exact,
+                of_posed,
+            ),
+            None => renderer.backward(&posed, camera, &settings, rendered, of_rendered, exact, of_posed),
+        }
+        if let Some(layer) = &mut self.layer {
+            layer.step(frame.pose, camera, &of_rendered.image).map_err(&in_scene)?;
+        }
         let Avatar { gaussians, binding } = &self.parameters.avatar;
         scratch.of_avatar.reset(gaussians, matches!(binding, Binding::Face(_)));
         let upstream = &scratch.of_posed;

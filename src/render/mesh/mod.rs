@@ -8,16 +8,18 @@
 //! values that the closure returns. Both sides of a triangle are drawn. Pixels are independent: the result is the same,
 //! bit for bit, for any number of threads.
 
+mod adjoint;
 mod pattern;
 mod raster;
 mod setup;
 mod texture;
 
+pub use adjoint::texture_gradient;
 pub use pattern::SamplePattern;
 pub use setup::NEAR_PLANE;
 pub use texture::Texture;
 
-use crate::scene::{Camera, Image, Mask, Rendered, SceneError};
+use crate::scene::{Camera, Image, Mask, Rendered, SceneError, Underlay};
 use glam::Vec3;
 use raster::PixelSamples;
 use rayon::prelude::*;
@@ -93,6 +95,11 @@ impl Drawing {
             *z *= a;
         }
         Rendered { image, alpha: self.coverage.clone(), depth }
+    }
+
+    /// The drawing as a layer among Gaussians.
+    pub fn underlay(&self) -> Underlay<'_> {
+        Underlay { colour: &self.colour, coverage: &self.coverage, depth: &self.depth }
     }
 }
 

@@ -21,10 +21,15 @@ impl Texture {
         &self.texels
     }
 
+    /// The image, mutable.
+    pub fn image_mut(&mut self) -> &mut Image {
+        &mut self.texels
+    }
+
     /// The bilinearly interpolated texel at (u, v). A NaN reads the left or the top border.
-    pub fn sample(&self, [u, v]: [f32; 2]) -> [f32; 3] {
-        let (left, right, fx) = neighbours(u, self.texels.width());
-        let (top, bottom, fy) = neighbours(1.0 - v, self.texels.height());
+    pub fn sample(&self, uv: [f32; 2]) -> [f32; 3] {
+        let mix = Bilinear::at(uv, [self.texels.width(), self.texels.height()]);
+        let Bilinear { columns: [left, right], rows: [top, bottom], fraction: [fx, fy] } = mix;
         let at = |x, y| self.texels.at(x, y);
         let (a, b, c, d) = (at(left, top), at(right, top), at(left, bottom), at(right, bottom));
         std::array::from_fn(|k| {
@@ -40,8 +45,37 @@ impl Texture {
     }
 }
 
+/// The texels that a look-up mixes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bilinear {
+    columns: [usize; 2],
+    rows: [usize; 2],
+    /// From the first column and row to the second.
+    fraction: [f32; 2],
+}
+
+impl Bilinear {
+    /// At (u, v), in a texture of so many columns and rows.
+    pub(super) fn at([u, v]: [f32; 2], [width, height]: [usize; 2]) -> Self {
+        let (left, right, fx) = neighbours(u, width);
+        let (top, bottom, fy) = neighbours(1.0 - v, height);
+        Self { columns: [left, right], rows: [top, bottom], fraction: [fx, fy] }
+    }
+
+    /// Column and row of each texel, and its share.
+    pub(super) fn corners(&self) -> [([usize; 2], f32); 4] {
+        let Self { columns: [left, right], rows: [top, bottom], fraction: [fx, fy] } = *self;
+        [
+            ([left, top], (1.0 - fx) * (1.0 - fy)),
+            ([right, top], fx * (1.0 - fy)),
+            ([left, bottom], (1.0 - fx) * fy),
+            ([right, bottom], fx * fy),
+        ]
+    }
+}
+
 /// Texture coordinates of a fragment.
-fn coordinates(uv: &Uv, fragment: &Fragment) -> [f32; 2] {
+pub(super) fn coordinates(uv: &Uv, fragment: &Fragment) -> [f32; 2] {
     let corners = uv.faces[fragment.face as usize].map(|i| uv.coordinates[i as usize]);
     std::array::from_fn(|axis| (0..3).map(|k| corners[k][axis] * fragment.barycentric[k]).sum())
 }

@@ -11,6 +11,7 @@ use super::backward_gaussian::{BackwardGaussians, Output};
 use super::backward_strip::{self, BackwardStrip};
 use super::bin::{Bins, Grid};
 use super::blend::MAX_ALPHA;
+use super::pane::{Layer, Nothing};
 use super::project::View;
 use super::{RenderSettings, Renderer, check, chunk_length, with_scratch};
 use crate::scene::{Camera, Posed, PosedGradient, Rendered, RenderedGradient};
@@ -62,6 +63,21 @@ impl Renderer {
         derivatives: Derivatives,
         gradient: &mut PosedGradient,
     ) {
+        self.take_back(posed, camera, settings, Nothing, rendered, upstream, derivatives, gradient);
+    }
+
+    /// [`Renderer::backward`] with a layer among the splats.
+    pub(super) fn take_back(
+        &mut self,
+        posed: &Posed,
+        camera: &Camera,
+        settings: &RenderSettings,
+        layer: impl Layer,
+        rendered: &Rendered,
+        upstream: &RenderedGradient,
+        derivatives: Derivatives,
+        gradient: &mut PosedGradient,
+    ) {
         check(posed, camera);
         check_sizes(camera, rendered, upstream);
         let view = View::new(camera, settings.antialiased);
@@ -72,7 +88,8 @@ impl Renderer {
         );
         let mut memory = std::mem::take(&mut self.backward);
         let lengths = memory.lay_out(&self.bins, grid.count());
-        self.backward_strips(grid, settings.background, upstream, derivatives, &lengths, &mut memory);
+        let behind = (settings.background, layer);
+        self.backward_strips(grid, behind, upstream, derivatives, &lengths, &mut memory);
         self.backward_gaussians(posed, &view, derivatives, &mut memory, gradient);
         self.backward = memory;
     }
@@ -80,7 +97,7 @@ impl Renderer {
     fn backward_strips(
         &self,
         grid: Grid,
-        background: [f32; 3],
+        (background, layer): ([f32; 3], impl Layer),
         upstream: &RenderedGradient,
         derivatives: Derivatives,
         lengths: &[usize],
@@ -110,6 +127,7 @@ impl Renderer {
                     splats: &self.splats,
                     upstream,
                     background,
+                    layer,
                     greatest_alpha,
                     sums,
                     scratch,

@@ -10,6 +10,7 @@
 
 use super::blend::{BETWEEN_CHECKS, COLUMN, LEAST_TRANSMITTANCE, MAX_ALPHA, ROW, uncapped_alpha};
 use super::lanes::Lanes;
+use super::pane::Pane;
 use super::preprocess::Splat;
 use super::reach::BLOCK;
 use super::wide::{Wide, each};
@@ -89,6 +90,7 @@ impl Shares {
         [left, top]: [usize; 2],
         list: &[u16],
         splats: &[Splat],
+        pane: &mut impl Pane,
         open: &mut [f32; 16],
     ) {
         if self.shares.len() < list.len() {
@@ -106,7 +108,9 @@ impl Shares {
                 break;
             }
             for &i in run {
-                let uncapped = uncapped_alpha(&splats[usize::from(i)].paint, x, y);
+                let paint = &splats[usize::from(i)].paint;
+                pane.dim(l, paint.depth, &mut transmittance);
+                let uncapped = uncapped_alpha(paint, x, y);
                 let after = uncapped.min(n(MAX_ALPHA)).neg_mul_add(transmittance, transmittance);
                 let enough = after.at_least(n(LEAST_TRANSMITTANCE));
                 let uncapped = enough.keep(uncapped);
@@ -123,7 +127,7 @@ impl Shares {
 }
 
 /// One block on the way back.
-pub(super) struct BlockAdjoint<'a> {
+pub(super) struct BlockAdjoint<'a, P> {
     pub(super) corner: [usize; 2],
     pub(super) shares: &'a mut Shares,
     /// Of the segment.
@@ -132,6 +136,8 @@ pub(super) struct BlockAdjoint<'a> {
     pub(super) places: &'a [u32],
     /// Uncapped alphas above this pass no derivative on.
     pub(super) greatest_alpha: f32,
+    /// What lies among the splats and was not crossed yet.
+    pub(super) pane: &'a mut P,
 }
 
 /// Vectors of pixels of up to sixteen splats, before they are summed.
@@ -144,7 +150,7 @@ struct Pending {
     places: [u32; 16],
 }
 
-impl BlockAdjoint<'_> {
+impl<P: Pane> BlockAdjoint<'_, P> {
     /// Adds to `sums` what the block's pixels ask of its splats.
     #[inline(always)]
     pub(super) fn run<L: Lanes>(self, l: L, upstream: &mut BlockUpstream, sums: &mut [SplatSums]) {
@@ -156,6 +162,7 @@ impl BlockAdjoint<'_> {
             for (k, (share, &i)) in shares.iter().zip(indices).enumerate().rev() {
                 let i = usize::from(i);
                 let paint = &self.splats[i].paint;
+                self.pane.cross_back(l, paint.depth, &colour, &mut after);
                 let uncapped = Wide::load(l, &share.uncapped);
                 let transmittance = Wide::load(l, &share.transmittance);
                 let alpha = uncapped.min(n(MAX_ALPHA));

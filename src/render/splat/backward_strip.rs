@@ -3,9 +3,11 @@
 use super::backward_blend::{BlockAdjoint, BlockUpstream, Shares, SplatSums};
 use super::bin::{Bins, Entry, STRIP_TILES, STRIP_WIDTH, sort_by_depth, splat_of};
 use super::lanes::{Kernel, Lanes};
+use super::pane::{Layer, Pane};
 use super::preprocess::Splat;
 use super::project::TILE;
 use super::reach::{BLOCK, COLUMNS, SEGMENT, Segment};
+use super::wide::Wide;
 use crate::scene::RenderedGradient;
 
 const BLOCKS: usize = COLUMNS * TILE / BLOCK;
@@ -29,7 +31,7 @@ pub(super) struct Scratch {
 }
 
 /// Sums the derivatives of a strip's pixels by splat.
-pub(super) struct BackwardStrip<'a> {
+pub(super) struct BackwardStrip<'a, Y> {
     /// Strip number in the grid, and its column and row there.
     pub(super) strip: usize,
     pub(super) column: usize,
@@ -38,6 +40,7 @@ pub(super) struct BackwardStrip<'a> {
     pub(super) splats: &'a [Splat],
     pub(super) upstream: &'a RenderedGradient,
     pub(super) background: [f32; 3],
+    pub(super) layer: Y,
     /// Uncapped alphas above this pass no derivative on.
     pub(super) greatest_alpha: f32,
     /// One per splat of the strip, in the order in which the chunks list them.
@@ -45,7 +48,7 @@ pub(super) struct BackwardStrip<'a> {
     pub(super) scratch: &'a mut Scratch,
 }
 
-impl Kernel for BackwardStrip<'_> {
+impl<Y: Layer> Kernel for BackwardStrip<'_, Y> {
     type Output = ();
 
     #[inline(always)]
@@ -59,9 +62,10 @@ impl Kernel for BackwardStrip<'_> {
             self.load(segment - 1);
             self.advance(l, segment);
         }
+        let mut behind: Vec<Option<Y::Pane>> = vec![None; BLOCKS];
         for segment in (0..segments).rev() {
             self.load(segment);
-            self.backpropagate(l, segment);
+            self.backpropagate(l, segment, &mut behind);
         }
     }
 }
@@ -75,7 +79,7 @@ impl Scratch {
     }
 }
 
-impl BackwardStrip<'_> {
+impl<Y: Layer> BackwardStrip<'_, Y> {
     fn gather(&mut self) {
         let Scratch { entries, splats, .. } = &mut *self.scratch;
         entries.clear();
@@ -104,6 +108,22 @@ impl BackwardStrip<'_> {
         [self.column * STRIP_WIDTH + column * BLOCK, self.row * TILE + band * BLOCK]
     }
 
+    /// Depth of a segment's first splat.
+    fn first_depth(&self, segment: usize) -> f32 {
+        f32::from_bits((self.scratch.entries[segment * SEGMENT] >> 32) as u32)
+    }
+
+    /// What lies among the splats of a block from a segment on. What lies in front of the segment was crossed before:
+    /// [`BackwardStrip::advance`] sees to that.
+    #[inline(always)]
+    fn pane_from<L: Lanes>(&self, l: L, segment: usize, corner: [usize; 2]) -> Y::Pane {
+        let mut pane = self.layer.pane(corner);
+        if Y::Pane::PRESENT && segment > 0 {
+            pane.dim(l, self.first_depth(segment), &mut Wide::splat(l, 0.0));
+        }
+        pane
+    }
+
     /// Finds what the loaded segment leaves open for the one that comes `next`.
     #[inline(always)]
     fn advance<L: Lanes>(&mut self, l: L, next: usize) {
@@ -114,20 +134,29 @@ impl BackwardStrip<'_> {
             for column in 0..COLUMNS {
                 let block = band * COLUMNS + column;
                 let corner = self.corner(block);
+                let mut pane = self.pane_from(l, next - 1, corner);
+                let depth = self.first_depth(next);
                 let Scratch { segment, shares, open, .. } = &mut *self.scratch;
-                shares.collect(l, corner, segment.list(column), &segment.splats, &mut open[start + block]);
+                let open = &mut open[start + block];
+                shares.collect(l, corner, segment.list(column), &segment.splats, &mut pane, open);
+                if Y::Pane::PRESENT {
+                    let mut left = Wide::load(l, open);
+                    pane.dim(l, depth, &mut left);
+                    *open = left.store();
+                }
             }
         }
     }
 
     #[inline(always)]
-    fn backpropagate<L: Lanes>(&mut self, l: L, segment: usize) {
-        let start = segment * BLOCKS;
+    fn backpropagate<L: Lanes>(&mut self, l: L, number: usize, behind: &mut [Option<Y::Pane>]) {
+        let start = number * BLOCKS;
         for band in 0..BLOCKS / COLUMNS {
             self.scratch.segment.list_band(l, band);
             for column in 0..COLUMNS {
                 let block = band * COLUMNS + column;
                 let corner = self.corner(block);
+                let mut pane = self.pane_from(l, number, corner);
                 let Scratch { places, segment, shares, open, upstream, .. } = &mut *self.scratch;
                 let list = segment.list(column);
                 if list.is_empty() {
@@ -138,13 +167,15 @@ impl BackwardStrip<'_> {
                 if upstream.is_zero() {
                     continue;
                 }
-                shares.collect(l, corner, list, &segment.splats, &mut open[start + block]);
+                shares.collect(l, corner, list, &segment.splats, &mut pane, &mut open[start + block]);
+                let pane = behind[block].get_or_insert_with(|| self.layer.pane(corner));
                 let adjoint = BlockAdjoint {
                     corner,
                     shares,
                     splats: &segment.splats,
                     places,
                     greatest_alpha: self.greatest_alpha,
+                    pane,
                 };
                 adjoint.run(l, upstream, self.sums);
             }

@@ -1,6 +1,7 @@
 //! Front-to-back blending of one 4x4-pixel block, sixteen lanes at once.
 
 use super::lanes::Lanes;
+use super::pane::Pane;
 use super::preprocess::{Paint, Splat};
 use super::wide::{Wide, each};
 
@@ -26,6 +27,15 @@ pub(super) struct Block {
     open: [f32; 16],
     colour: [[f32; 16]; 3],
     depth: [f32; 16],
+}
+
+/// A block in registers.
+pub(super) struct Light<L: Lanes> {
+    pub(super) transmittance: Wide<L>,
+    /// See [`Block`].
+    pub(super) open: Wide<L>,
+    pub(super) colour: [Wide<L>; 3],
+    pub(super) depth: Wide<L>,
 }
 
 /// A finished block.
@@ -61,39 +71,68 @@ impl Block {
         }
     }
 
-    /// Blends the listed splats, in order, into the block whose first pixel is (`left`, `top`).
     #[inline(always)]
-    pub(super) fn blend<L: Lanes>(&mut self, l: L, [left, top]: [usize; 2], list: &[u16], splats: &[Splat]) {
+    fn light<L: Lanes>(&self, l: L) -> Light<L> {
+        Light {
+            transmittance: Wide::load(l, &self.transmittance),
+            open: Wide::load(l, &self.open),
+            colour: each(self.colour, |c| Wide::load(l, &c)),
+            depth: Wide::load(l, &self.depth),
+        }
+    }
+
+    #[inline(always)]
+    fn keep<L: Lanes>(&mut self, light: &Light<L>) {
+        self.transmittance = light.transmittance.store();
+        self.open = light.open.store();
+        self.colour = each(light.colour, Wide::store);
+        self.depth = light.depth.store();
+    }
+
+    /// Blends what is left of a pane behind all splats.
+    #[inline(always)]
+    pub(super) fn finish<L: Lanes>(&mut self, l: L, pane: &mut impl Pane) {
+        let mut light = self.light(l);
+        pane.cross(l, f32::INFINITY, &mut light);
+        self.keep(&light);
+    }
+
+    /// Blends the listed splats, in order, and the pane among them, into the block whose first pixel is (`left`, `top`).
+    #[inline(always)]
+    pub(super) fn blend<L: Lanes>(
+        &mut self,
+        l: L,
+        [left, top]: [usize; 2],
+        list: &[u16],
+        splats: &[Splat],
+        pane: &mut impl Pane,
+    ) {
         let n = |value: f32| Wide::splat(l, value);
         let x = Wide::load(l, &COLUMN) + n(left as f32);
         let y = Wide::load(l, &ROW) + n(top as f32);
-        let mut transmittance = Wide::load(l, &self.transmittance);
-        let mut open = Wide::load(l, &self.open);
-        let [mut red, mut green, mut blue] = each(self.colour, |c| Wide::load(l, &c));
-        let mut depth = Wide::load(l, &self.depth);
+        let mut light = self.light(l);
         for run in list.chunks(BETWEEN_CHECKS) {
-            if !n(0.0).less(open).any() {
+            if !n(0.0).less(light.open).any() {
                 break;
             }
             for &i in run {
                 let paint = &splats[usize::from(i)].paint;
+                pane.cross(l, paint.depth, &mut light);
                 let alpha = uncapped_alpha(paint, x, y).min(n(MAX_ALPHA));
                 // Without a branch: pixels finish at different splats, which no processor predicts.
-                let after = alpha.neg_mul_add(open, open);
+                let after = alpha.neg_mul_add(light.open, light.open);
                 let enough = after.at_least(n(LEAST_TRANSMITTANCE));
-                let weight = enough.keep(alpha * open);
-                open = enough.keep(after);
-                transmittance = enough.select(after, transmittance);
-                red = weight.mul_add(n(paint.colour[0]), red);
-                green = weight.mul_add(n(paint.colour[1]), green);
-                blue = weight.mul_add(n(paint.colour[2]), blue);
-                depth = weight.mul_add(n(paint.depth), depth);
+                let weight = enough.keep(alpha * light.open);
+                light.open = enough.keep(after);
+                light.transmittance = enough.select(after, light.transmittance);
+                let [red, green, blue] = &mut light.colour;
+                *red = weight.mul_add(n(paint.colour[0]), *red);
+                *green = weight.mul_add(n(paint.colour[1]), *green);
+                *blue = weight.mul_add(n(paint.colour[2]), *blue);
+                light.depth = weight.mul_add(n(paint.depth), light.depth);
             }
         }
-        self.transmittance = transmittance.store();
-        self.open = open.store();
-        self.colour = [red.store(), green.store(), blue.store()];
-        self.depth = depth.store();
+        self.keep(&light);
     }
 }
 

@@ -31,6 +31,8 @@ mod gaussians_fixture;
 mod lanes;
 #[cfg(target_arch = "x86_64")]
 mod lanes_x86;
+mod over;
+mod pane;
 mod preprocess;
 mod profile;
 mod project;
@@ -45,6 +47,7 @@ pub use profile::{Phase, PhaseTimes};
 use crate::scene::{Camera, Image, Mask, Posed, Rendered};
 use bin::{Bins, Grid, STRIP_WIDTH};
 use lanes::Simd;
+use pane::{Layer, Nothing};
 use preprocess::{Preprocess, Splat};
 use project::{TILE, View};
 use rayon::prelude::*;
@@ -133,7 +136,7 @@ impl Renderer {
         settings: &RenderSettings,
         rendered: &mut Rendered,
     ) {
-        self.draw(posed, camera, settings, rendered, false);
+        self.draw(posed, camera, settings, (Nothing, None), rendered, false);
     }
 
     /// [`Renderer::render_into`], and where the time went.
@@ -147,14 +150,16 @@ impl Renderer {
         settings: &RenderSettings,
         rendered: &mut Rendered,
     ) -> PhaseTimes {
-        self.draw(posed, camera, settings, rendered, true)
+        self.draw(posed, camera, settings, (Nothing, None), rendered, true)
     }
 
+    /// Draws with a layer among the splats, and notes what is shown of it.
     fn draw(
         &mut self,
         posed: &Posed,
         camera: &Camera,
         settings: &RenderSettings,
+        layer: (impl Layer, Option<&mut Mask>),
         rendered: &mut Rendered,
         profiled: bool,
     ) -> PhaseTimes {
@@ -170,7 +175,7 @@ impl Renderer {
         let view = View::new(camera, settings.antialiased);
         let grid = Grid::new(view.tiles);
         self.preprocess(posed, &view, grid);
-        self.draw_strips(grid, settings.background, rendered);
+        self.draw_strips(grid, settings.background, layer, rendered);
         let mut times = PhaseTimes::default();
         for scratch in &mut self.scratch {
             times.add(&scratch.get_mut().unwrap_or_else(PoisonError::into_inner).clock.times);
@@ -192,17 +197,27 @@ impl Renderer {
         });
     }
 
-    fn draw_strips(&self, grid: Grid, background: [f32; 3], rendered: &mut Rendered) {
+    fn draw_strips(
+        &self,
+        grid: Grid,
+        background: [f32; 3],
+        (layer, shown): (impl Layer, Option<&mut Mask>),
+        rendered: &mut Rendered,
+    ) {
         let width = rendered.image.width();
         let slab = width * TILE;
+        let mut shown: Vec<&mut [f32]> =
+            shown.map(|mask| mask.values_mut().chunks_mut(slab).collect()).unwrap_or_default();
+        shown.resize_with(rendered.image.height().div_ceil(TILE), Default::default);
         let Rendered { image, alpha, depth } = rendered;
         let slabs = image
             .pixels_mut()
             .par_chunks_mut(slab)
             .zip(alpha.values_mut().par_chunks_mut(slab))
-            .zip(depth.values_mut().par_chunks_mut(slab));
-        slabs.enumerate().for_each(|(row, ((colour, alpha), depth))| {
-            let strips = split_slab(width, colour, alpha, depth);
+            .zip(depth.values_mut().par_chunks_mut(slab))
+            .zip(shown);
+        slabs.enumerate().for_each(|(row, (((colour, alpha), depth), shown))| {
+            let strips = split_slab(width, colour, alpha, depth, shown);
             strips.into_par_iter().enumerate().for_each(|(column, rows)| {
                 with_scratch(&self.scratch, |scratch| {
                     self.simd.run(DrawStrip {
@@ -212,6 +227,7 @@ impl Renderer {
                         bins: &self.bins,
                         splats: &self.splats,
                         background,
+                        layer,
                         rows,
                         scratch,
                     });
@@ -238,6 +254,7 @@ fn split_slab<'a>(
     colour: &'a mut [[f32; 3]],
     alpha: &'a mut [f32],
     depth: &'a mut [f32],
+    shown: &'a mut [f32],
 ) -> Vec<Rows<'a>> {
     let mut strips: Vec<Rows> = Vec::new();
     strips.resize_with(width.div_ceil(STRIP_WIDTH), Rows::default);
@@ -249,6 +266,11 @@ fn split_slab<'a>(
             .zip(depth.chunks_mut(STRIP_WIDTH));
         for (strip, ((colour, alpha), depth)) in strips.iter_mut().zip(parts) {
             (strip.colour[y], strip.alpha[y], strip.depth[y]) = (colour, alpha, depth);
+        }
+    }
+    for (y, row) in shown.chunks_mut(width).enumerate() {
+        for (strip, part) in strips.iter_mut().zip(row.chunks_mut(STRIP_WIDTH)) {
+            strip.shown[y] = part;
         }
     }
     strips

@@ -3,6 +3,7 @@
 use super::bin::{Bins, Entry, STRIP_TILES, STRIP_WIDTH, sort_by_depth, splat_of};
 use super::blend::{Block, Pixels};
 use super::lanes::{Kernel, Lanes};
+use super::pane::{Layer, Pane};
 use super::preprocess::Splat;
 use super::profile::{Clock, Phase};
 use super::project::TILE;
@@ -14,6 +15,8 @@ pub(super) struct Rows<'a> {
     pub(super) colour: [&'a mut [[f32; 3]]; TILE],
     pub(super) alpha: [&'a mut [f32]; TILE],
     pub(super) depth: [&'a mut [f32]; TILE],
+    /// What is shown of the layer; empty without one.
+    pub(super) shown: [&'a mut [f32]; TILE],
 }
 
 /// Memory that strips reuse, one after the other.
@@ -29,7 +32,7 @@ pub(super) struct Scratch {
 }
 
 /// Draws a strip.
-pub(super) struct DrawStrip<'a, 'b> {
+pub(super) struct DrawStrip<'a, 'b, Y> {
     /// Strip number in the grid, and its column and row there.
     pub(super) strip: usize,
     pub(super) column: usize,
@@ -37,11 +40,12 @@ pub(super) struct DrawStrip<'a, 'b> {
     pub(super) bins: &'a [Bins],
     pub(super) splats: &'a [Splat],
     pub(super) background: [f32; 3],
+    pub(super) layer: Y,
     pub(super) rows: Rows<'b>,
     pub(super) scratch: &'a mut Scratch,
 }
 
-impl Kernel for DrawStrip<'_, '_> {
+impl<Y: Layer> Kernel for DrawStrip<'_, '_, Y> {
     type Output = ();
 
     #[inline(always)]
@@ -50,18 +54,19 @@ impl Kernel for DrawStrip<'_, '_> {
         self.fill_background();
         self.scratch.clock.lap(Phase::Write);
         self.gather();
-        if self.scratch.entries.is_empty() {
+        if self.scratch.entries.is_empty() && !Y::Pane::PRESENT {
             return;
         }
         sort_by_depth(&mut self.scratch.entries, &mut self.scratch.spare);
         self.scratch.clock.lap(Phase::Sort);
-        self.blend(l);
-        self.write(l);
+        let mut panes = self.panes();
+        self.blend(l, &mut panes);
+        self.write(l, &mut panes);
         self.scratch.clock.lap(Phase::Write);
     }
 }
 
-impl DrawStrip<'_, '_> {
+impl<Y: Layer> DrawStrip<'_, '_, Y> {
     fn gather(&mut self) {
         self.scratch.entries.clear();
         for bins in self.bins {
@@ -69,8 +74,18 @@ impl DrawStrip<'_, '_> {
         }
     }
 
+    /// The layer by block.
     #[inline(always)]
-    fn blend<L: Lanes>(&mut self, l: L) {
+    fn panes(&self) -> Vec<Y::Pane> {
+        let pane = |block: usize| {
+            let (band, column) = (block / COLUMNS, block % COLUMNS);
+            self.layer.pane([self.column * STRIP_WIDTH + column * BLOCK, self.row * TILE + band * BLOCK])
+        };
+        (0..COLUMNS * TILE / BLOCK).map(pane).collect()
+    }
+
+    #[inline(always)]
+    fn blend<L: Lanes>(&mut self, l: L, panes: &mut [Y::Pane]) {
         let Scratch { entries, segment, blocks, clock, .. } = &mut *self.scratch;
         let left = self.column * STRIP_WIDTH;
         let top = self.row * TILE;
@@ -79,14 +94,16 @@ impl DrawStrip<'_, '_> {
         for run in entries.chunks(SEGMENT) {
             segment.load(run.iter().map(|&e| self.splats[splat_of(e)]), self.column * STRIP_TILES, top);
             clock.lap(Phase::Bin);
-            for (band, blocks) in blocks.chunks_mut(COLUMNS).enumerate() {
+            let bands = blocks.chunks_mut(COLUMNS).zip(panes.chunks_mut(COLUMNS));
+            for (band, (blocks, panes)) in bands.enumerate() {
                 segment.list_band(l, band);
                 clock.lap(Phase::Bin);
-                for (column, block) in blocks.iter_mut().enumerate() {
+                for (column, (block, pane)) in blocks.iter_mut().zip(panes).enumerate() {
                     let list = segment.list(column);
                     if !list.is_empty() {
                         let corner = [left + column * BLOCK, top + band * BLOCK];
-                        block.get_or_insert_with(Block::new).blend(l, corner, list, &segment.splats);
+                        let block = block.get_or_insert_with(Block::new);
+                        block.blend(l, corner, list, &segment.splats, pane);
                     }
                 }
                 clock.lap(Phase::Blend);
@@ -104,14 +121,28 @@ impl DrawStrip<'_, '_> {
     }
 
     #[inline(always)]
-    fn write<L: Lanes>(&mut self, l: L) {
-        for (band, blocks) in self.scratch.blocks.chunks(COLUMNS).enumerate() {
-            for (column, block) in blocks.iter().enumerate() {
+    fn write<L: Lanes>(&mut self, l: L, panes: &mut [Y::Pane]) {
+        let bands = self.scratch.blocks.chunks_mut(COLUMNS).zip(panes.chunks_mut(COLUMNS));
+        for (band, (blocks, panes)) in bands.enumerate() {
+            for (column, (block, pane)) in blocks.iter_mut().zip(panes).enumerate() {
+                let (left, top) = (column * BLOCK, band * BLOCK);
+                if Y::Pane::PRESENT {
+                    block.get_or_insert_with(Block::new).finish(l, pane);
+                    write_shown(pane.shown(), &mut self.rows, left, top);
+                }
                 if let Some(block) = block {
-                    let pixels = block.pixels(l, self.background);
-                    pixels.write(&mut self.rows, column * BLOCK, band * BLOCK);
+                    block.pixels(l, self.background).write(&mut self.rows, left, top);
                 }
             }
+        }
+    }
+}
+
+/// Writes the part of a block's shares that lies within the image.
+fn write_shown(shown: &[f32; 16], rows: &mut Rows, left: usize, top: usize) {
+    for (row, values) in shown.chunks(BLOCK).enumerate() {
+        if let Some(out) = rows.shown[top + row].get_mut(left..) {
+            out.iter_mut().zip(values).for_each(|(out, value)| *out = *value);
         }
     }
 }
