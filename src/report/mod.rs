@@ -20,6 +20,7 @@ mod layout;
 mod markdown;
 mod page;
 mod paper;
+pub mod plot;
 mod results;
 pub mod stats;
 mod table;
