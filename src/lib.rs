@@ -20,7 +20,7 @@
 //! # Layers
 //! A module imports only from modules above it in this list (`tests/architecture.rs` reads the imports):
 //! [`math`] → [`scene`] → [`strategy`], [`render`], [`metrics`] → [`data`] → [`experiment`] → [`fit`], [`run`],
-//! [`report`] → [`cli`].
+//! [`report`], [`trade`] → [`cli`].
 
 pub mod cli;
 pub mod data;
@@ -33,3 +33,4 @@ pub mod report;
 pub mod run;
 pub mod scene;
 pub mod strategy;
+pub mod trade;

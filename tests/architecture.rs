@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 /// Module, layer, and same-layer modules that it may import all the same.
-const LAYERS: [(&str, u8, &[&str]); 11] = [
+const LAYERS: [(&str, u8, &[&str]); 12] = [
     ("math", 0, &[]),
     ("scene", 1, &[]),
     ("strategy", 2, &[]),
@@ -15,16 +15,18 @@ const LAYERS: [(&str, u8, &[&str]); 11] = [
     ("fit", 5, &[]),
     ("run", 5, &["fit"]),
     ("report", 5, &["run"]),
+    ("trade", 5, &["run", "fit", "report"]),
     ("cli", 6, &[]),
 ];
 
 /// Crates that belong to one place: everything else stays free of them.
-const HOMES: [(&str, &[&str]); 5] = [
+const HOMES: [(&str, &[&str]); 6] = [
     ("clap::", &["src/cli"]),
     ("indicatif::", &["src/cli"]),
     ("anyhow::", &["src/cli"]),
     ("gltf::", &["src/data"]),
     ("npyz::", &["src/data"]),
+    ("plotters::", &["src/report/plot"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

@@ -1,5 +1,6 @@
 //! Which data a command looks at.
 
+use crate::data::Subject;
 use crate::data::folder::Options;
 use crate::data::registry::{Dataset, Registry};
 use crate::experiment::Experiment;
@@ -48,6 +49,34 @@ impl Data {
             None => d.is_available(),
         };
         registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset)).collect()
+    }
+
+    /// True if a folder or a registry was named.
+    pub(super) fn is_given(&self) -> bool {
+        self.data.is_some() || self.datasets.is_some()
+    }
+
+    /// A subject by `DATASET/SUBJECT` or by its own id alone, and the id of its data set.
+    pub(super) fn subject(&self, name: &str) -> Result<(String, Subject)> {
+        let (dataset, subject) = match name.split_once('/') {
+            Some((dataset, subject)) => (Some(dataset), subject),
+            None => (None, name),
+        };
+        let mut known = Vec::new();
+        let mut found = Vec::new();
+        for loaded in self.available(dataset)? {
+            for candidate in loaded.subjects {
+                known.push(format!("{}/{}", loaded.id, candidate.id));
+                if candidate.id == subject {
+                    found.push((loaded.id.clone(), candidate));
+                }
+            }
+        }
+        match found.len() {
+            1 => Ok(found.remove(0)),
+            0 => bail!("subject `{name}`; expected one of {}", known.join(", ")),
+            _ => bail!("subject `{name}` is in several data sets; expected DATASET/SUBJECT"),
+        }
     }
 
     fn load(&self, dataset: &Dataset) -> Result<LoadedDataset> {

@@ -64,7 +64,7 @@ impl Fit {
         }
         let recipe = Recipe::parse(&self.recipe)?;
         let strategy: Strategy = recipe.strategy.parse()?;
-        let (dataset, subject) = self.subject()?;
+        let (dataset, subject) = self.data.subject(&self.subject)?;
         let (training, tests) = self.sequences(&subject)?;
         let own = recipe.iterations;
         let iterations = self.profile.fit_iterations.map_or(own, |most| own.min(most));
@@ -104,29 +104,6 @@ impl Fit {
         drop(watch);
         self.print(&report)?;
         Ok(Exit::Success)
-    }
-
-    /// The subject, and the id of its data set.
-    fn subject(&self) -> Result<(String, Subject)> {
-        let (dataset, subject) = match self.subject.split_once('/') {
-            Some((dataset, subject)) => (Some(dataset), subject),
-            None => (None, self.subject.as_str()),
-        };
-        let mut known = Vec::new();
-        let mut found = Vec::new();
-        for loaded in self.data.available(dataset)? {
-            for candidate in loaded.subjects {
-                known.push(format!("{}/{}", loaded.id, candidate.id));
-                if candidate.id == subject {
-                    found.push((loaded.id.clone(), candidate));
-                }
-            }
-        }
-        match found.len() {
-            1 => Ok(found.remove(0)),
-            0 => bail!("subject `{}`; expected one of {}", self.subject, known.join(", ")),
-            _ => bail!("subject `{}` is in several data sets; expected DATASET/SUBJECT", self.subject),
-        }
     }
 
     /// The training sequence and the test sequences as the profile sees them.

@@ -19,6 +19,7 @@ mod run;
 mod score;
 mod selection;
 mod skin;
+mod trade;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -55,6 +56,7 @@ enum Command {
     Skin(skin::Skin),
     Score(score::Score),
     Blend(blend::Blend),
+    Trade(trade::Trading),
     Inspect(inspect::Inspect),
     Completions(completions::Completions),
 }
@@ -128,6 +130,7 @@ impl Command {
             Self::Skin(command) => command.run(context),
             Self::Score(command) => command.run(context),
             Self::Blend(command) => command.run(),
+            Self::Trade(command) => command.run(context),
             Self::Inspect(command) => command.run(),
             Self::Completions(command) => command.run(),
         }

@@ -52,6 +52,12 @@ impl Watch {
         self.detail(format!(" | loss {:.4}, {:.2} dB, {} splats", step.loss, step.psnr, step.splats));
     }
 
+    /// So many steps are done, and what comes next.
+    pub(super) fn at(&self, done: usize, next: &str) {
+        self.bar.set_position(done as u64);
+        self.detail(format!(" | {next}"));
+    }
+
     /// Says something above the bar.
     #[allow(clippy::print_stderr, reason = "a warning for the person at the terminal")]
     pub(super) fn above(&self, text: &str, quiet: bool) {

@@ -20,6 +20,7 @@ mod layout;
 mod markdown;
 mod page;
 mod paper;
+pub mod plot;
 mod replicates;
 mod results;
 pub mod stats;

@@ -1,0 +1,145 @@
+//! `reproduce trade`: what every choice costs, and how far it is from the exact answer.
+
+use super::data::Data;
+use super::output::emit;
+use super::progress::Watch;
+use super::{Context, Exit};
+use crate::data::{Subject, atomic, ply};
+use crate::experiment::recipe::Placement;
+use crate::report::plot::{png, svg};
+use crate::trade::{self, Options, SWEEPS, Stage, Sweep, Trade};
+use anyhow::{Context as _, Result, bail};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// The subject that is measured unless another is named.
+const DEFAULT_SUBJECT: &str = "synthetic/ring_stripes";
+
+/// Measure speed against accuracy: solvers, influences, precision, colour, storage, splats, cut-offs, resolution.
+///
+/// Everything is measured in one run on one avatar, in the subject's test motion and in one whose joints are turned by
+/// nearly 180 degrees. Writes trade.md, trade.csv, trade.json and a plot of time against error per table and motion, and
+/// ends with a recommendation for offline scoring, real-time engines and browsers. Times are of one thread: run it on an
+/// idle machine. Everything but times is the same from run to run.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Trading {
+    /// What to measure on: the ids of a data set and of a subject (see `reproduce list datasets`), or a subject's alone
+    /// [default: a built-in subject, or the first of --data]
+    #[arg(value_name = "DATASET/SUBJECT")]
+    subject: Option<String>,
+    /// The avatar to measure, bound to the subject's body [default: made from the training frames]
+    #[arg(long, value_name = "AVATAR.ply")]
+    avatar: Option<PathBuf>,
+    /// How the avatar is made if none is given
+    #[arg(long, value_enum, default_value_t, conflicts_with = "avatar")]
+    recipe: Recipe,
+    /// Only these tables (repeatable)
+    #[arg(long = "only", value_name = "TABLE", value_parser = table)]
+    only: Vec<&'static str>,
+    /// A look in seconds: small images, few Gaussians, few repeats
+    #[arg(long)]
+    quick: bool,
+    /// Folder to write to
+    #[arg(long, value_name = "DIR", default_value = "runs/trade")]
+    out: PathBuf,
+    #[command(flatten)]
+    data: Data,
+}
+
+/// How an avatar is made from training frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+enum Recipe {
+    /// A Gaussian per vertex, with skinning weights.
+    #[default]
+    SurfaceVertex,
+    /// A Gaussian per face, bound to it.
+    SurfaceFace,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce trade                                    all tables on a built-in subject, in minutes
+  reproduce trade --quick --only solver              one table, in seconds
+  reproduce trade ava --data DIR --avatar ava.ply    a fitted avatar";
+
+/// The id of a table.
+fn table(id: &str) -> Result<&'static str, String> {
+    let known = SWEEPS.iter().find(|known| **known == id);
+    known.copied().ok_or_else(|| format!("expected one of {}", SWEEPS.join(", ")))
+}
+
+impl Trading {
+    pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        let (name, subject) = self.subject()?;
+        let given = self.avatar.as_deref().map(ply::read_avatar).transpose()?;
+        let watch = Watch::new(context.quiet);
+        watch.start("avatar", 1);
+        let stage = Stage::new(&name, &subject, given, &self.options());
+        let stage = match &self.avatar {
+            Some(path) => stage.with_context(|| format!("{}: cannot be measured", path.display()))?,
+            None => stage?,
+        };
+        let ids = if self.only.is_empty() { SWEEPS.to_vec() } else { self.only.clone() };
+        watch.start("tables", ids.len());
+        let mut begun = 0;
+        let sweeps = trade::measure(&stage, &ids, &mut |id| {
+            watch.at(begun, id);
+            begun += 1;
+        })?;
+        drop(watch);
+        let result = Trade::new(&stage, &sweeps);
+        let page = self.write(&result, &sweeps)?;
+        if !context.quiet {
+            emit(&page)?;
+        }
+        Ok(Exit::Success)
+    }
+
+    fn options(&self) -> Options {
+        let options = if self.quick { Options::quick() } else { Options::standard() };
+        let placement = match self.recipe {
+            Recipe::SurfaceVertex => Placement::Vertices,
+            Recipe::SurfaceFace => Placement::Faces,
+        };
+        Options { placement, ..options }
+    }
+
+    /// The subject and its full name.
+    fn subject(&self) -> Result<(String, Subject)> {
+        let named = match (&self.subject, self.data.is_given()) {
+            (Some(subject), _) => subject.as_str(),
+            (None, false) => DEFAULT_SUBJECT,
+            (None, true) => {
+                let first = self.data.available(None)?.into_iter().find(|d| !d.subjects.is_empty());
+                let Some(mut dataset) = first else { bail!("--data: no subject; expected at least one") };
+                let subject = dataset.subjects.swap_remove(0);
+                return Ok((format!("{}/{}", dataset.id, subject.id), subject));
+            }
+        };
+        let (dataset, subject) = self.data.subject(named)?;
+        Ok((format!("{dataset}/{}", subject.id), subject))
+    }
+
+    /// Writes the pictures and the result in three formats; returns the page.
+    fn write(&self, result: &Trade, sweeps: &[Sweep]) -> Result<String> {
+        std::fs::create_dir_all(&self.out)
+            .with_context(|| format!("{}: cannot make the folder", self.out.display()))?;
+        let save = |name: &str, bytes: &[u8]| atomic::write(&self.out.join(name), |w| w.write_all(bytes));
+        let mut pictures = Vec::new();
+        for sweep in sweeps {
+            for motion in ["test", "extreme"] {
+                let Some(plot) = trade::scatter(sweep, motion) else { continue };
+                let name = format!("{}-{motion}", sweep.id);
+                save(&format!("{name}.svg"), svg(&plot)?.as_bytes())?;
+                save(&format!("{name}.png"), &png(&plot)?)?;
+                pictures.push((sweep.id.to_owned(), format!("{name}.svg"), plot.title));
+            }
+        }
+        let page = trade::markdown(result, &pictures);
+        save("trade.csv", trade::csv(result).as_bytes())?;
+        save("trade.json", trade::json(result).as_bytes())?;
+        save("trade.md", page.as_bytes())?;
+        Ok(page)
+    }
+}

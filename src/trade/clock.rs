@@ -1,0 +1,74 @@
+//! Repeated timing.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+/// The time of one piece of work over several repeats, seconds.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Spread {
+    /// Median.
+    pub median: f64,
+    /// First quartile.
+    pub low: f64,
+    /// Third quartile.
+    pub high: f64,
+    /// Repeats behind it.
+    pub repeats: usize,
+}
+
+impl Spread {
+    /// The quartiles of some times, at least one.
+    pub fn of(times: &[f64]) -> Self {
+        let mut sorted = times.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let at = |p: f64| sorted[((sorted.len() - 1) as f64 * p).round() as usize];
+        Self { median: at(0.5), low: at(0.25), high: at(0.75), repeats: sorted.len() }
+    }
+
+    /// The same per part of the work.
+    pub fn per(self, parts: usize) -> Self {
+        let parts = parts.max(1) as f64;
+        Self {
+            median: self.median / parts,
+            low: self.low / parts,
+            high: self.high / parts,
+            repeats: self.repeats,
+        }
+    }
+}
+
+/// Times a piece of work `repeats` times (at least once), after one run that is not counted. What it returns is kept from
+/// being optimised away.
+pub(super) fn time<T>(repeats: usize, mut work: impl FnMut() -> T) -> Spread {
+    black_box(work());
+    let times: Vec<f64> = (0..repeats.max(1))
+        .map(|_| {
+            let start = Instant::now();
+            black_box(work());
+            // Zero has no logarithm, and no clock is finer than a nanosecond.
+            start.elapsed().as_secs_f64().max(1e-9)
+        })
+        .collect();
+    Spread::of(&times)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quartiles_of_known_times() {
+        let spread = Spread::of(&[5.0, 1.0, 4.0, 2.0, 3.0]);
+        assert_eq!((spread.low, spread.median, spread.high, spread.repeats), (2.0, 3.0, 4.0, 5));
+        assert_eq!(spread.per(2).high, 2.0);
+        assert_eq!(Spread::of(&[7.0]).median, 7.0);
+    }
+
+    #[test]
+    fn work_is_done_once_more_than_it_is_counted() {
+        let mut runs = 0;
+        let spread = time(4, || runs += 1);
+        assert_eq!((runs, spread.repeats), (5, 4));
+        assert!(spread.low > 0.0);
+    }
+}
