@@ -1,7 +1,7 @@
 //! An avatar in one pose, walked block by block: what [`pose`](super::pose()) and its adjoint share.
 
 use super::blend::Blend;
-use super::bound::{BodyShape, Moves};
+use super::bound::Moves;
 use super::face_frame;
 use super::joints::Joints;
 use super::layout::{Chunk, LANES, Lanes};
@@ -38,11 +38,7 @@ impl<'a> Frame<'a> {
         body: &'a PosedBody<'a>,
         strategy: &'a Strategy,
     ) -> Result<Self, StrategyError> {
-        let shape = BodyShape::of(body.rest);
-        if shape != bound.shape {
-            let (found, expected) = (shape.to_string(), bound.shape.to_string());
-            return Err(StrategyError::OtherBody { found, expected });
-        }
+        bound.check_body(body)?;
         let needs_faces = strategy.rotation.needs_faces() || strategy.covariance == CovarianceChoice::Surfel;
         if needs_faces && bound.surface.is_none() && bound.moves != Moves::Not {
             return Err(StrategyError::NoFaces { strategy: strategy.to_string() });

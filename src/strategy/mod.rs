@@ -18,6 +18,7 @@
 //! [`Posed`]: crate::scene::Posed
 
 mod adjoint;
+mod auto;
 mod bake;
 mod blend;
 mod bound;
@@ -30,6 +31,7 @@ mod frame;
 mod joints;
 mod layout;
 pub mod nearest;
+pub mod needs;
 mod pose;
 mod presets;
 mod rest_faces;
@@ -39,6 +41,7 @@ mod spec;
 mod surfel;
 
 pub use adjoint::pose_backward;
+pub use auto::{Auto, Choice, Resolved, Views};
 pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;
 pub use choices::{
