@@ -264,12 +264,12 @@ fn bounds_are_near_for_two_bones() {
         }
     }
     for (choice, tightness) in choices.iter().zip(&tightness) {
-        println!("{choice}: {tightness:.4}");
         let least = match choice.to_string().as_str() {
             "power-0" | "power-1" | "power-2" | "power-4" => 0.999,
             "nlerp" | "power-0-nlerp" => 0.95,
             "gram-schmidt-columns" | "gram-schmidt-rows" => 0.7,
-            "matrix-to-quaternion" | "squaring-0" | "power-0-column" => 0.6,
+            "matrix-to-quaternion" => 0.8,
+            "squaring-0" | "power-0-column" => 0.4,
             _ => 0.0,
         };
         assert!(*tightness >= least, "{choice}: the error is at most {tightness} of the bound");

@@ -8,7 +8,7 @@ use crate::metrics::Protocol;
 use crate::render::mesh::SamplePattern;
 use crate::render::splat::{RenderSettings, Renderer};
 use crate::scene::{Camera, Image, Pose, PosedBody};
-use crate::strategy::{self, Strategy};
+use crate::strategy::{self, Choice, Views};
 use std::time::Instant;
 
 /// Samples per pixel side with which textured meshes are drawn: 16 samples on a rotated grid.
@@ -46,12 +46,14 @@ impl<'a> Frame<'a> {
                 let pattern = SamplePattern::new(MESH_SAMPLES);
                 let image = textured.draw(self.pose, self.camera, pattern, background)?.image;
                 seconds.render = start.elapsed().as_secs_f64();
-                return Ok(Drawn { image, splats: None, visible_splats: None });
+                return Ok(Drawn { image, splats: None, visible_splats: None, picked: None });
             }
             Prepared::Gaussians(bound) => bound,
         };
-        let strategy: Strategy = variant.strategy.as_deref().unwrap_or_default().parse()?;
+        let choice: Choice = variant.strategy.as_deref().unwrap_or_default().parse()?;
         let start = Instant::now();
+        let strategy::Resolved { strategy, bound: proved } =
+            choice.resolve(bound, &self.body, Views::Few(1))?;
         let posed = strategy::pose(bound, &self.body, &strategy)?;
         seconds.pose = start.elapsed().as_secs_f64();
         let settings = RenderSettings { background, antialiased: job.antialiased };
@@ -59,7 +61,8 @@ impl<'a> Frame<'a> {
         let image = renderer.render(&posed, self.camera, &settings).image;
         seconds.render = start.elapsed().as_secs_f64();
         let (splats, visible) = (posed.len() as u64, renderer.visible() as u64);
-        Ok(Drawn { image, splats: Some(splats), visible_splats: Some(visible) })
+        let picked = proved.map(|_| strategy.to_string());
+        Ok(Drawn { image, splats: Some(splats), visible_splats: Some(visible), picked })
     }
 }
 
@@ -70,6 +73,8 @@ pub(super) struct Drawn {
     pub(super) splats: Option<u64>,
     /// Those that reach the image.
     pub(super) visible_splats: Option<u64>,
+    /// The strategy, if it was picked for the pose.
+    pub(super) picked: Option<String>,
 }
 
 /// The background of a job's protocol.

@@ -41,7 +41,7 @@ mod spec;
 mod surfel;
 
 pub use adjoint::pose_backward;
-pub use auto::{Auto, Choice, Resolved, Views};
+pub use auto::{Auto, CANDIDATES, Choice, Resolved, Views};
 pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;
 pub use choices::{

@@ -8,10 +8,12 @@ mod gap;
 mod groups;
 mod pose;
 mod theory;
+mod verdict;
 
 pub(super) use groups::{Group, groups};
 pub use pose::PoseBounds;
 pub(super) use theory::rounding;
+pub use verdict::{Pick, Verdict};
 
 use super::{BoundAvatar, RotationChoice};
 use crate::math::rotation;
@@ -49,6 +51,8 @@ pub struct Needs {
     pub bounds: Vec<Bound>,
     /// `fewer_influences[k - 1]`: the same for the exact average of the k heaviest influences.
     pub fewer_influences: Vec<Degrees>,
+    /// What is enough at a tolerance.
+    pub verdict: Verdict,
 }
 
 /// A value and the pose in which it was found.
@@ -117,7 +121,7 @@ pub const LISTED: [&str; 20] = [
 ];
 
 impl Needs {
-    /// What the poses of a motion need. Without a pose, what the avatar needs at rest.
+    /// What the poses of a motion need, at a tolerance in degrees. Without a pose, what the avatar needs at rest.
     ///
     /// # Errors
     /// A pose that is not one of the body.
@@ -126,6 +130,7 @@ impl Needs {
         body: &RestBody,
         poses: &[Pose],
         choices: &[RotationChoice],
+        tolerance: f64,
     ) -> Result<Self, SceneError> {
         let rest = [Pose::rest(&body.skeleton)];
         let poses = if poses.is_empty() { &rest } else { poses };
@@ -161,6 +166,7 @@ impl Needs {
             gap_bound: gap::bound(&frames),
             gap: gap::exact(bound.all_chunks(), &frames),
             pairs,
+            verdict: Verdict::new(&frames, tolerance),
             bounds: choices
                 .iter()
                 .map(|&rotation| Bound {
