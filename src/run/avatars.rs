@@ -47,7 +47,7 @@ pub fn prepare(
         let avatar = surface_init(&sequence, &surface_options(build))?;
         ply::write_avatar(&file, &avatar, &ply::Metadata::default(), ply::Encoding::LittleEndian)?;
     }
-    let bound = BoundAvatar::new(&ply::read_avatar(&file)?, &sequence.body)?;
+    let bound = BoundAvatar::new(&ply::read_avatar(&file)?, &sequence.body)?.without_zero_bands();
     Ok(Prepared::Gaussians(Box::new(bound)))
 }
 

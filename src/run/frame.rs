@@ -8,7 +8,7 @@ use crate::metrics::Protocol;
 use crate::render::mesh::SamplePattern;
 use crate::render::splat::{RenderSettings, Renderer};
 use crate::scene::{Camera, Image, Pose, PosedBody};
-use crate::strategy::{self, Choice, Views};
+use crate::strategy::{self, Choice, PoseBuffers, Views};
 use std::time::Instant;
 
 /// Samples per pixel side with which textured meshes are drawn: 16 samples on a rotated grid.
@@ -54,7 +54,8 @@ impl<'a> Frame<'a> {
         let start = Instant::now();
         let strategy::Resolved { strategy, bound: proved } =
             choice.resolve(bound, &self.body, Views::Few(1))?;
-        let posed = strategy::pose(bound, &self.body, &strategy)?;
+        let posed =
+            strategy::pose_seen(bound, &self.body, &strategy, self.camera, &mut PoseBuffers::default())?;
         seconds.pose = start.elapsed().as_secs_f64();
         let settings = RenderSettings { background, antialiased: job.antialiased };
         let start = Instant::now();

@@ -6,7 +6,7 @@ use crate::data::Sequence;
 use crate::metrics::{self, Protocol};
 use crate::render::splat::{RenderSettings, Renderer};
 use crate::scene::{Avatar, PosedBody};
-use crate::strategy::{BoundAvatar, Strategy, pose};
+use crate::strategy::{BoundAvatar, PoseBuffers, Strategy, pose_seen};
 use rayon::prelude::*;
 
 /// Poses, renders and scores an avatar on every frame of a sequence, by the default protocol.
@@ -22,13 +22,16 @@ pub fn held_out(
     let protocol = Protocol::parse("default")?;
     let background = protocol.background_colour().unwrap_or([1.0; 3]);
     let settings = RenderSettings { background, antialiased: false };
-    let bound = BoundAvatar::new(avatar, &sequence.body)?;
+    let bound = BoundAvatar::new(avatar, &sequence.body)?.without_zero_bands();
+    let read = bound.joints_read(strategy);
     let score = |renderer: &mut Renderer, index: usize| {
         let truth = sequence.truth(index)?;
         let frame = &sequence.frames[index];
-        let body = PosedBody::new(&sequence.body, &sequence.poses[frame.pose])?;
-        let posed = pose(&bound, &body, strategy)?;
-        let image = renderer.render(&posed, &sequence.cameras[frame.camera], &settings).image;
+        let camera = &sequence.cameras[frame.camera];
+        let pose = &sequence.poses[frame.pose];
+        let body = PosedBody::with_rotations(&sequence.body, pose, |joint| read[joint])?;
+        let posed = pose_seen(&bound, &body, strategy, camera, &mut PoseBuffers::default())?;
+        let image = renderer.render(&posed, camera, &settings).image;
         Ok(protocol.score(&image, metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha })?)
     };
     let frames = (0..sequence.frames.len()).into_par_iter();

@@ -3,7 +3,7 @@
 use super::layout::{self, CHUNK, Chunk};
 use super::needs::Group;
 use super::seat::{self, Seat, Surface};
-use super::{CovarianceChoice, StrategyError, needs, surfel};
+use super::{CovarianceChoice, Strategy, StrategyError, needs, surfel};
 use crate::math::sh;
 use crate::scene::{Avatar, Binding, Gaussians, PosedBody, RestBody, SceneError, SkinWeights};
 use glam::Vec3;
@@ -217,6 +217,16 @@ impl BoundAvatar {
     /// The Gaussians by their joints. Gathered when first asked for; weights do not change after binding.
     pub(crate) fn groups(&self) -> &[Group] {
         self.groups.get_or_init(|| needs::groups(&self.chunks))
+    }
+
+    /// For each joint whether a strategy reads its rotation: for [`PosedBody::with_rotations`]. Strategies that read the
+    /// mesh read all.
+    pub fn joints_read(&self, strategy: &Strategy) -> Vec<bool> {
+        let mut read = vec![strategy.rotation.needs_faces(); self.shape.joints];
+        for &joint in self.groups().iter().flat_map(Group::joints) {
+            read[usize::from(joint)] = true;
+        }
+        read
     }
 
     /// The Gaussians as they were bound.

@@ -37,6 +37,7 @@ mod presets;
 mod rest_faces;
 mod rotate;
 mod seat;
+mod sight;
 mod spec;
 mod surfel;
 
@@ -48,5 +49,5 @@ pub use choices::{
     ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
 };
 pub use error::StrategyError;
-pub use pose::{PoseBuffers, pose, pose_into};
+pub use pose::{PoseBuffers, pose, pose_into, pose_seen};
 pub use presets::{PRESETS, Preset};

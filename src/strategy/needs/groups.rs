@@ -82,6 +82,11 @@ pub(super) fn weights(chunks: &[Chunk], group: &Group) -> Vec<Vec<f64>> {
 }
 
 impl Group {
+    /// The joints, ascending.
+    pub(in super::super) fn joints(&self) -> &[u16] {
+        &self.joints
+    }
+
     fn empty(joints: Vec<u16>, heaviest: usize) -> Self {
         let n = joints.len();
         let pairs = if n <= PAIRED { n * (n - 1) / 2 } else { 0 };

@@ -113,6 +113,7 @@ impl<'a> PoseBounds<'a> {
                 // Joints that scale are averaged by their rotations.
                 rounding::blended(spread, if self.deviation <= RIGID { self.deviation } else { 0.0 })
             }
+            RotationChoice::QuaternionAverage(Solver::Nlerp) if spread.bones > 1 => rounding::summed(spread),
             RotationChoice::Lbs(projection) if spread.bones > 1 || projection.converts() => {
                 rounding::projected(spread, self.deviation)
             }

@@ -182,6 +182,11 @@ pub(in super::super) mod rounding {
         STORED + own / spread.gap.max(SETTLED_GAP)
     }
 
+    /// A sum of n quaternions in `f32` that is at least half as long as its weights.
+    pub(in super::super) fn summed(spread: &Spread) -> f64 {
+        STORED + 6.0 * (spread.bones as f64 + 2.0) * UNIT
+    }
+
     /// Projections in `f32`, which have no `f64` behind them.
     pub(in super::super) fn projected(spread: &Spread, deviation: f64) -> f64 {
         let own = (48.0 + 4.0 * spread.bones as f64) * UNIT + 8.0 * deviation;
