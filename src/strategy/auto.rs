@@ -49,7 +49,7 @@ pub struct Resolved {
 }
 
 /// What [`Auto`] chooses from, cheapest first, with what posing a Gaussian costs in nanoseconds: `cargo bench --bench
-/// auto` on one core, SH degree 0, 100,000 Gaussians on one to four bones. An order, not a clock: the choice depends on
+/// posing -- candidates` on one core, SH degree 0, 100,000 Gaussians on one to four bones. An order, not a clock: the choice depends on
 /// avatar, pose and tolerance alone. Every other solver and projection of this program costs more than the exact closed
 /// form, which works on eight Gaussians at a time.
 pub const CANDIDATES: [(RotationChoice, f64); 3] = [
