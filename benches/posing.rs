@@ -10,7 +10,10 @@ mod rig;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Mat3, Vec3};
 use skinsplat::scene::{AvatarGradient, Binding, Posed, PosedBody, PosedGradient};
-use skinsplat::strategy::{BoundAvatar, PRESETS, PoseBuffers, Strategy, pose, pose_backward, pose_into};
+use skinsplat::strategy::needs::Needs;
+use skinsplat::strategy::{
+    BoundAvatar, Choice, PRESETS, PoseBuffers, Strategy, Views, pose, pose_backward, pose_into,
+};
 use std::hint::black_box;
 
 fn posing(c: &mut Criterion) {
@@ -69,6 +72,33 @@ fn upstream(posed: &Posed<'_>) -> PosedGradient {
     gradient
 }
 
+/// What `auto` chooses from, and the other solvers: the static costs in `strategy::CANDIDATES`.
+fn candidates(c: &mut Criterion) {
+    let body = rig::body();
+    let posed_body = PosedBody::new(&body, &rig::pose(&body)).unwrap();
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let bound = BoundAvatar::new(&rig::scattered(&body, 0), &body).unwrap();
+    let base = Strategy::preset("quaternion-average").unwrap();
+    let mut group = c.benchmark_group("candidates");
+    group.throughput(Throughput::Elements(bound.len() as u64));
+    for rotation in Needs::listed() {
+        let (strategy, mut buffers) = (Strategy { rotation, ..base }, PoseBuffers::default());
+        group.bench_function(BenchmarkId::from_parameter(rotation), |b| {
+            one_thread.install(|| {
+                b.iter(|| {
+                    let posed = pose_into(&bound, &posed_body, &strategy, &mut buffers).unwrap();
+                    buffers.reclaim(black_box(posed));
+                });
+            });
+        });
+    }
+    group.throughput(Throughput::Elements(1));
+    group.bench_function("bounds-of-a-pose", |b| {
+        let choice: Choice = "auto:0.5".parse().unwrap();
+        b.iter(|| black_box(choice.resolve(&bound, &posed_body, Views::Any)));
+    });
+}
+
 fn updating(c: &mut Criterion) {
     let body = rig::body();
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
@@ -96,5 +126,5 @@ fn binding(c: &mut Criterion) {
         .bench_function("100k-nearest-faces", |b| b.iter(|| BoundAvatar::new(&avatar, &body).unwrap()));
 }
 
-criterion_group!(benches, posing, updating, binding);
+criterion_group!(benches, posing, candidates, updating, binding);
 criterion_main!(benches);

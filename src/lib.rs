@@ -31,6 +31,7 @@ pub mod metrics;
 pub mod render;
 pub mod report;
 pub mod run;
+pub mod savings;
 pub mod scene;
 pub mod strategy;
 pub mod trade;

@@ -1,5 +1,7 @@
 //! `reproduce inspect`: what a file holds, and what is wrong with it.
 
+mod needs;
+
 use super::Exit;
 use super::output::emit;
 use crate::data::folder::{self, Options};
@@ -20,11 +22,17 @@ pub(super) struct Inspect {
     /// What to look at
     #[arg(value_name = "FILE")]
     file: PathBuf,
+    #[command(flatten)]
+    motion: needs::Motion,
 }
 
 impl Inspect {
     pub(super) fn run(&self) -> Result<Exit> {
         let path = &self.file;
+        if self.motion.asked() {
+            self.motion.print(path)?;
+            return Ok(Exit::Success);
+        }
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         let text = match extension.as_str() {
             _ if path.is_dir() => folder_text(path)?,

@@ -2,7 +2,7 @@
 
 use crate::data::{body, ply, poses};
 use crate::scene::{Avatar, Binding, Pose, Posed, PosedBody, RestBody};
-use crate::strategy::{self, BoundAvatar, Strategy};
+use crate::strategy::{self, BoundAvatar, Choice, Resolved, Views};
 use anyhow::{Context as _, Result, bail};
 use std::path::{Path, PathBuf};
 
@@ -22,9 +22,10 @@ pub(super) struct Posing {
     /// Pose of the track, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: usize,
-    /// Rotation strategy: a preset, or a preset with changed axes (see `reproduce list strategies`)
+    /// Rotation strategy: a preset, a preset with changed axes (see `reproduce list strategies`), or auto:DEGREES, the
+    /// cheapest that is proved to be within so many degrees of the exact average in this pose
     #[arg(long, value_name = "S", default_value = "quaternion-average")]
-    strategy: Strategy,
+    strategy: Choice,
 }
 
 /// An avatar that is ready to be posed.
@@ -34,9 +35,9 @@ pub(super) struct Subject {
 }
 
 impl Posing {
-    /// The strategy in its written form.
-    pub(super) fn strategy(&self) -> &Strategy {
-        &self.strategy
+    /// The strategy as it was asked for.
+    pub(super) fn strategy(&self) -> Choice {
+        self.strategy
     }
 
     /// True if a body was named.
@@ -89,19 +90,29 @@ impl Subject {
         &self.avatar
     }
 
-    /// Poses the avatar and hands the Gaussians to `use_posed`; without a body they stay where they are.
+    /// Poses the avatar and hands the Gaussians to `use_posed`, with the strategy that posed them; without a body they stay
+    /// where they are.
     pub(super) fn posed<T>(
         &self,
-        strategy: &Strategy,
-        use_posed: impl FnOnce(&Posed) -> Result<T>,
+        choice: Choice,
+        views: Views,
+        use_posed: impl FnOnce(&Posed, Option<&Resolved>) -> Result<T>,
     ) -> Result<T> {
         match &self.rest {
-            None => use_posed(&Posed::from_static(&self.avatar.gaussians)),
+            None => use_posed(&Posed::from_static(&self.avatar.gaussians), None),
             Some((rest, pose)) => {
                 let bound = BoundAvatar::new(&self.avatar, rest)?;
                 let body = PosedBody::new(rest, pose)?;
-                use_posed(&strategy::pose(&bound, &body, strategy)?)
+                let resolved = choice.resolve(&bound, &body, views)?;
+                use_posed(&strategy::pose(&bound, &body, &resolved.strategy)?, Some(&resolved))
             }
         }
     }
+}
+
+/// What `auto` picked, for a note; none for a strategy that was given.
+pub(super) fn picked(choice: Choice, resolved: Option<&Resolved>) -> Option<String> {
+    let Resolved { strategy, bound } = resolved?;
+    let degrees = strategy::needs::Degrees((*bound)?);
+    Some(format!("{choice}: {strategy}, within {degrees} of the exact average"))
 }

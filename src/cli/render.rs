@@ -1,8 +1,10 @@
 //! `reproduce render`: an avatar, posed or as it stands, through a camera.
 
-use super::{Context, Exit, posing::Posing, selection::parse_colour};
+use super::posing::{Posing, picked};
+use super::{Context, Exit, selection::parse_colour};
 use crate::data::{camera, frames};
 use crate::render::splat::{self, RenderSettings};
+use crate::strategy::Views;
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 
@@ -48,11 +50,16 @@ impl Render {
         let background = self.background.or(view.background).unwrap_or([0.0; 3]);
         let settings = RenderSettings { background, antialiased: self.antialiased };
         let subject = self.posing.load(&self.file)?;
-        let rendered = subject
-            .posed(self.posing.strategy(), |posed| Ok(splat::render(posed, &view.camera, &settings)))?;
+        let choice = self.posing.strategy();
+        let (rendered, note) = subject.posed(choice, Views::Few(1), |posed, resolved| {
+            Ok((splat::render(posed, &view.camera, &settings), picked(choice, resolved)))
+        })?;
         match extension.as_str() {
             "png" => frames::save_png(&self.out, &rendered.image)?,
             _ => frames::save_npy(&self.out, &rendered.image)?,
+        }
+        if let Some(note) = note {
+            context.note(note);
         }
         let (n, out) = (subject.avatar().gaussians.len(), self.out.display());
         context.note(format!("{out}: {n} Gaussians, {}x{}", view.camera.width, view.camera.height));

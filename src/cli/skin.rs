@@ -1,9 +1,10 @@
 //! `reproduce skin`: a posed avatar as a plain 3DGS PLY.
 
-use super::{Context, Exit, posing::Posing};
+use super::posing::{Posing, picked};
+use super::{Context, Exit};
 use crate::data::ply;
 use crate::scene::{Avatar, Binding};
-use crate::strategy::bake;
+use crate::strategy::{Views, bake};
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 
@@ -28,12 +29,17 @@ impl Skin {
             bail!("--body is missing: an avatar is posed by a body");
         }
         let subject = self.posing.load(&self.avatar)?;
-        let strategy = self.posing.strategy();
+        let choice = self.posing.strategy();
         let canonical = &subject.avatar().gaussians;
-        let baked = subject.posed(strategy, |posed| Ok(bake(posed, canonical)))?;
+        let (baked, resolved) = subject
+            .posed(choice, Views::Any, |posed, resolved| Ok((bake(posed, canonical), resolved.copied())))?;
+        let strategy = resolved.map(|resolved| resolved.strategy.to_string()).unwrap_or_default();
         let avatar = Avatar { gaussians: baked.gaussians, binding: Binding::Static };
         let metadata = ply::Metadata { body: None, comments: vec![format!("posed by {strategy}")] };
         ply::write_avatar(&self.out, &avatar, &metadata, ply::Encoding::LittleEndian)?;
+        if let Some(note) = picked(choice, resolved.as_ref()) {
+            context.note(note);
+        }
         if let Some(loss) = baked.loss {
             context.note(format!("{}: {loss}", self.out.display()));
         }

@@ -1,7 +1,7 @@
 //! Protocols and strategies by their specs: the one place where experiments meet the layers that define them.
 
 use crate::metrics::{MetricsError, Protocol};
-use crate::strategy::{Strategy, StrategyError};
+use crate::strategy::{Choice, Strategy, StrategyError};
 
 /// The protocol of a spec.
 ///
@@ -19,9 +19,21 @@ pub(super) fn protocol(spec: &str) -> Result<Protocol, (String, String)> {
 /// # Errors
 /// What is wrong with the spec, and what is known.
 pub(super) fn strategy(spec: &str) -> Result<Strategy, (String, String)> {
-    spec.parse().map_err(|error| match error {
+    spec.parse().map_err(|error| explained(spec, error))
+}
+
+/// The strategy of a spec, or what picks one for each pose.
+///
+/// # Errors
+/// What is wrong with the spec, and what is known.
+pub(super) fn choice(spec: &str) -> Result<Choice, (String, String)> {
+    spec.parse().map_err(|error| explained(spec, error))
+}
+
+fn explained(spec: &str, error: StrategyError) -> (String, String) {
+    match error {
         StrategyError::UnknownId { axis, id, expected } => (format!("unknown {axis} `{id}`"), expected),
         StrategyError::BadVariation { part, expected } => (format!("`{part}`"), expected),
         other => (format!("`{spec}`: {other}"), "a valid strategy".to_owned()),
-    })
+    }
 }

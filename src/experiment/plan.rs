@@ -7,7 +7,7 @@ use super::{
     SubjectInfo, Variant, catalog, content_key,
 };
 use crate::metrics::{MetricKind, Protocol, ProtocolId};
-use crate::strategy::Strategy;
+use crate::strategy::Choice;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -220,7 +220,7 @@ impl Builder<'_> {
         };
         let strategy = match &variant.strategy {
             None => None,
-            Some(spec) => Some(catalog::strategy(spec).map_err(|why| invalid("strategy", why))?),
+            Some(spec) => Some(catalog::choice(spec).map_err(|why| invalid("strategy", why))?),
         };
         let avatar = self.avatar(variant, row).map_err(|why| invalid("avatar", why))?;
         Ok(Prepared { variant: variant.clone(), avatar, strategy })
@@ -356,7 +356,7 @@ struct Prepared {
     /// Key of the avatar.
     avatar: String,
     /// The strategy in full, so that two specs of one strategy share their keys.
-    strategy: Option<Strategy>,
+    strategy: Option<Choice>,
 }
 
 fn find_sequence<'a>(subject: &'a SubjectInfo, id: &str) -> &'a SequenceInfo {

@@ -103,7 +103,7 @@ fn frame(job: &Job, key: &str, records: &Records) -> (FrameResult, Option<u64>) 
     };
     let mut count = None;
     match records.get(key).map(|record| &record.outcome) {
-        Some(Outcome::Scored { score, splats, visible_splats }) => {
+        Some(Outcome::Scored { score, splats, visible_splats, .. }) => {
             result.score = Some(score.clone());
             result.visible_splats = *visible_splats;
             count = *splats;

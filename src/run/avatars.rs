@@ -46,7 +46,7 @@ pub fn prepare(
         let avatar = surface_init(&sequence, &surface_options(build))?;
         ply::write_avatar(&file, &avatar, &ply::Metadata::default(), ply::Encoding::LittleEndian)?;
     }
-    let bound = Box::new(BoundAvatar::new(&ply::read_avatar(&file)?, &sequence.body)?);
+    let bound = Box::new(BoundAvatar::new(&ply::read_avatar(&file)?, &sequence.body)?.without_zero_bands());
     let mesh = build.fit.as_ref().and_then(|planned| planned.options.recipe.mesh.as_ref());
     Ok(match mesh {
         Some(_) => {

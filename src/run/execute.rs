@@ -1,7 +1,7 @@
 //! Executing jobs: one frame at a time, its truth loaded once, every variant posed, rendered and scored against it.
 
 use super::avatars::{Prepared, prepare};
-use super::frame::{Frame, background};
+use super::frame::{Drawn, Frame, background};
 use super::store::Store;
 use super::{Error, Library};
 use crate::data::Sequence;
@@ -166,5 +166,6 @@ fn run_variant(
     let truth = metrics::Truth::Straight { rgb: &frame.truth.rgb, alpha: &frame.truth.alpha };
     let score = protocol.score_with(&drawn.image, truth, job.lpips.then_some(distances))?;
     seconds.score = start.elapsed().as_secs_f64();
-    Ok(Outcome::Scored { score, splats: drawn.splats, visible_splats: drawn.visible_splats })
+    let Drawn { splats, visible_splats, picked, .. } = drawn;
+    Ok(Outcome::Scored { score, splats, visible_splats, picked })
 }

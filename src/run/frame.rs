@@ -9,7 +9,7 @@ use crate::metrics::Protocol;
 use crate::render::mesh::SamplePattern;
 use crate::render::splat::{RenderSettings, Renderer};
 use crate::scene::{Camera, Image, Mask, Pose, Posed, PosedBody, Rendered};
-use crate::strategy::{self, Strategy};
+use crate::strategy::{self, Choice, PoseBuffers, Views};
 use std::time::Instant;
 
 /// A frame, loaded.
@@ -44,14 +44,17 @@ impl<'a> Frame<'a> {
                 let pattern = SamplePattern::new(SAMPLES);
                 let image = textured.draw(self.pose, self.camera, pattern, background)?.image;
                 seconds.render = start.elapsed().as_secs_f64();
-                return Ok(Drawn { image, splats: None, visible_splats: None });
+                return Ok(Drawn { image, splats: None, visible_splats: None, picked: None });
             }
             Prepared::Gaussians(bound) => (bound, None),
             Prepared::Hybrid(bound, mesh) => (bound, Some(mesh)),
         };
-        let strategy: Strategy = variant.strategy.as_deref().unwrap_or_default().parse()?;
+        let choice: Choice = variant.strategy.as_deref().unwrap_or_default().parse()?;
         let start = Instant::now();
-        let posed = strategy::pose(bound, &self.body, &strategy)?;
+        let strategy::Resolved { strategy, bound: proved } =
+            choice.resolve(bound, &self.body, Views::Few(1))?;
+        let posed =
+            strategy::pose_seen(bound, &self.body, &strategy, self.camera, &mut PoseBuffers::default())?;
         seconds.pose = start.elapsed().as_secs_f64();
         let settings = RenderSettings { background, antialiased: job.antialiased };
         let start = Instant::now();
@@ -61,7 +64,8 @@ impl<'a> Frame<'a> {
         };
         seconds.render = start.elapsed().as_secs_f64();
         let (splats, visible) = (posed.len() as u64, renderer.visible() as u64);
-        Ok(Drawn { image, splats: Some(splats), visible_splats: Some(visible) })
+        let picked = proved.map(|_| strategy.to_string());
+        Ok(Drawn { image, splats: Some(splats), visible_splats: Some(visible), picked })
     }
 }
 
@@ -88,6 +92,8 @@ pub(super) struct Drawn {
     pub(super) splats: Option<u64>,
     /// Those that reach the image.
     pub(super) visible_splats: Option<u64>,
+    /// The strategy, if it was picked for the pose.
+    pub(super) picked: Option<String>,
 }
 
 /// The background of a job's protocol.

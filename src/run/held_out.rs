@@ -8,7 +8,7 @@ use crate::fit::train::Fitted;
 use crate::metrics::{self, Protocol};
 use crate::render::splat::{RenderSettings, Renderer};
 use crate::scene::PosedBody;
-use crate::strategy::{BoundAvatar, Strategy, pose};
+use crate::strategy::{BoundAvatar, PoseBuffers, Strategy, pose_seen};
 use rayon::prelude::*;
 
 /// Poses, renders and scores an avatar on every frame of a sequence, by the default protocol.
@@ -25,16 +25,17 @@ pub fn held_out<'a>(
     let background = protocol.background_colour().unwrap_or([1.0; 3]);
     let settings = RenderSettings { background, antialiased: false };
     let Fitted { avatar, mesh } = fitted.into();
-    let bound = BoundAvatar::new(avatar, &sequence.body)?;
+    let bound = BoundAvatar::new(avatar, &sequence.body)?.without_zero_bands();
+    let read = bound.joints_read(strategy);
     let score = |renderer: &mut Renderer, index: usize| {
         let truth = sequence.truth(index)?;
         let frame = &sequence.frames[index];
-        let (body_pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
-        let body = PosedBody::new(&sequence.body, body_pose)?;
-        let posed = pose(&bound, &body, strategy)?;
+        let (pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
+        let body = PosedBody::with_rotations(&sequence.body, pose, |joint| read[joint])?;
+        let posed = pose_seen(&bound, &body, strategy, camera, &mut PoseBuffers::default())?;
         let image = match mesh {
             None => renderer.render(&posed, camera, &settings).image,
-            Some(mesh) => together(renderer, &posed, (mesh, body_pose), camera, &settings)?.image,
+            Some(mesh) => together(renderer, &posed, (mesh, pose), camera, &settings)?.image,
         };
         Ok(protocol.score(&image, metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha })?)
     };

@@ -312,6 +312,19 @@ impl<'a> PosedBody<'a> {
     /// # Errors
     /// A pose of another number of nodes, or with values that are not finite.
     pub fn new(rest: &'a RestBody, pose: &Pose) -> Result<Self, SceneError> {
+        Self::with_rotations(rest, pose, |_| true)
+    }
+
+    /// [`PosedBody::new`] for a reader of some joints' rotations only: those of the others are left the identity, which
+    /// saves a polar decomposition each. Means and meshes do not read rotations.
+    ///
+    /// # Errors
+    /// As [`PosedBody::new`].
+    pub fn with_rotations(
+        rest: &'a RestBody,
+        pose: &Pose,
+        reads: impl Fn(usize) -> bool,
+    ) -> Result<Self, SceneError> {
         let skeleton = &rest.skeleton;
         if pose.locals.len() != skeleton.len() {
             let problem = format!("{} joints", pose.locals.len());
@@ -326,15 +339,16 @@ impl<'a> PosedBody<'a> {
             return Err(SceneError::new("transl", "NaN or infinite", "finite metres"));
         }
         let world = skeleton.world_transforms(pose);
-        let joint = |(world, bind): (&DAffine3, &DAffine3)| {
+        let joint = |(index, (world, bind)): (usize, (&DAffine3, &DAffine3))| {
             let skin = *world * *bind;
+            let rotation = || crate::math::rotation::nearest_rotation(skin.matrix3);
             JointTransform {
                 linear: skin.matrix3,
-                rotation: crate::math::rotation::nearest_rotation(skin.matrix3),
+                rotation: if reads(index) { rotation() } else { DQuat::IDENTITY },
                 translation: skin.translation + pose.translation,
             }
         };
-        let joints = world.iter().zip(&skeleton.inverse_binds).map(joint).collect();
+        let joints = world.iter().zip(&skeleton.inverse_binds).enumerate().map(joint).collect();
         Ok(Self {
             rest,
             joints,

@@ -1,10 +1,11 @@
 //! An avatar bound to a body: everything that does not depend on the pose, computed once.
 
 use super::layout::{self, CHUNK, Chunk};
+use super::needs::Group;
 use super::seat::{self, Seat, Surface};
-use super::{CovarianceChoice, StrategyError, surfel};
+use super::{CovarianceChoice, Strategy, StrategyError, needs, surfel};
 use crate::math::sh;
-use crate::scene::{Avatar, Binding, Gaussians, RestBody, SceneError, SkinWeights};
+use crate::scene::{Avatar, Binding, Gaussians, PosedBody, RestBody, SceneError, SkinWeights};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -20,6 +21,7 @@ use std::sync::OnceLock;
 pub struct BoundAvatar {
     chunks: Vec<Chunk>,
     discs: OnceLock<Vec<Chunk>>,
+    groups: OnceLock<Vec<Group>>,
     pub(crate) means: Vec<Vec3>,
     pub(crate) surface: Option<Surface>,
     pub(crate) moves: Moves,
@@ -106,6 +108,7 @@ impl BoundAvatar {
         let mut bound = Self {
             chunks: layout::chunks(n, weights),
             discs: OnceLock::new(),
+            groups: OnceLock::new(),
             means: vec![Vec3::ZERO; n],
             surface: seats.map(|seats| Surface::new(seats, body)),
             moves,
@@ -142,6 +145,15 @@ impl BoundAvatar {
         }
         self.refresh(&avatar.gaussians);
         Ok(())
+    }
+
+    /// The body has the counts of the one that the avatar was bound to.
+    pub(crate) fn check_body(&self, body: &PosedBody<'_>) -> Result<(), StrategyError> {
+        let shape = BodyShape::of(body.rest);
+        if shape == self.shape {
+            return Ok(());
+        }
+        Err(StrategyError::OtherBody { found: shape.to_string(), expected: self.shape.to_string() })
     }
 
     /// All arrays have an entry for each of the bound Gaussians.
@@ -200,6 +212,48 @@ impl BoundAvatar {
             }
             _ => &self.chunks,
         }
+    }
+
+    /// The Gaussians by their joints. Gathered when first asked for; weights do not change after binding.
+    pub(crate) fn groups(&self) -> &[Group] {
+        self.groups.get_or_init(|| needs::groups(&self.chunks))
+    }
+
+    /// For each joint whether a strategy reads its rotation: for [`PosedBody::with_rotations`]. Strategies that read the
+    /// mesh read all.
+    pub fn joints_read(&self, strategy: &Strategy) -> Vec<bool> {
+        let mut read = vec![strategy.rotation.needs_faces(); self.shape.joints];
+        for &joint in self.groups().iter().flat_map(Group::joints) {
+            read[usize::from(joint)] = true;
+        }
+        read
+    }
+
+    /// The Gaussians as they were bound.
+    pub(crate) fn all_chunks(&self) -> &[Chunk] {
+        &self.chunks
+    }
+
+    /// The highest SH degree of which some Gaussian has a coefficient other than 0.
+    pub fn sh_degree_present(&self) -> usize {
+        let count = self.sh_count();
+        let bands =
+            |own: &[[f32; 3]]| own.iter().rposition(|c| *c != [0.0; 3]).map_or(0, |last| last.isqrt());
+        self.sh.par_chunks_exact(count).map(bands).max().unwrap_or(0)
+    }
+
+    /// Drops the SH bands above [`Self::sh_degree_present`]: nothing that is drawn changes, and nothing is rotated or
+    /// evaluated that is 0. Not for fitting, where a band may be about to leave 0; [`Self::update`] brings them back.
+    #[must_use]
+    pub fn without_zero_bands(mut self) -> Self {
+        let (stored, present) = (self.sh_count(), self.sh_degree_present());
+        if present < self.sh_degree {
+            let kept = sh::count(present);
+            self.sh =
+                self.sh.par_chunks_exact(stored).flat_map_iter(|own| own[..kept].iter().copied()).collect();
+            self.sh_degree = present;
+        }
+        self
     }
 
     /// SH coefficients per Gaussian and channel.

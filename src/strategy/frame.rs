@@ -1,16 +1,17 @@
 //! An avatar in one pose, walked block by block: what [`pose`](super::pose()) and its adjoint share.
 
 use super::blend::Blend;
-use super::bound::{BodyShape, Moves};
+use super::bound::Moves;
 use super::face_frame;
 use super::joints::Joints;
 use super::layout::{Chunk, LANES, Lanes};
 use super::rotate::{BlockInput, Source, Turn, turn};
+use super::sight::Sight;
 use super::{
     BoundAvatar, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
     StrategyError,
 };
-use crate::scene::PosedBody;
+use crate::scene::{Camera, PosedBody};
 use glam::{Quat, Vec3};
 
 /// What all chunks of a frame share.
@@ -20,6 +21,8 @@ pub(super) struct Frame<'a> {
     pub(super) strategy: &'a Strategy,
     joints: Joints,
     pub(super) source: Source<'a>,
+    /// The only camera that will look, if what it does not see may be left out.
+    sight: Option<Sight>,
     arch: pulp::Arch,
 }
 
@@ -28,6 +31,10 @@ pub(super) trait Visitor {
     /// `turn` and `scales` (standard deviations) are those of the block at that position in its chunk. To be inlined, so
     /// that it is compiled for each instruction set.
     fn block(&mut self, position: usize, input: &BlockInput<'_>, turn: &Turn, scales: &[Lanes; 3]);
+
+    /// In place of [`Visitor::block`] for one that the camera of [`Frame::seen_by`] does not see. Nothing is to be done by
+    /// visitors of frames without a camera.
+    fn unseen(&mut self, _: &BlockInput<'_>, _: &[Lanes; 3]) {}
 }
 
 impl<'a> Frame<'a> {
@@ -38,11 +45,7 @@ impl<'a> Frame<'a> {
         body: &'a PosedBody<'a>,
         strategy: &'a Strategy,
     ) -> Result<Self, StrategyError> {
-        let shape = BodyShape::of(body.rest);
-        if shape != bound.shape {
-            let (found, expected) = (shape.to_string(), bound.shape.to_string());
-            return Err(StrategyError::OtherBody { found, expected });
-        }
+        bound.check_body(body)?;
         let needs_faces = strategy.rotation.needs_faces() || strategy.covariance == CovarianceChoice::Surfel;
         if needs_faces && bound.surface.is_none() && bound.moves != Moves::Not {
             return Err(StrategyError::NoFaces { strategy: strategy.to_string() });
@@ -53,7 +56,18 @@ impl<'a> Frame<'a> {
         } else {
             Source::Identity
         };
-        Ok(Self { bound, body, strategy, joints, source, arch })
+        Ok(Self { bound, body, strategy, joints, source, sight: None, arch })
+    }
+
+    /// Leaves out what a camera does not see, where that is known before Gaussians are turned: they move by their weights
+    /// and keep their size.
+    pub(super) fn seen_by(self, camera: &Camera) -> Self {
+        let converted = self.strategy.rotation == RotationChoice::Lbs(LbsProjection::MatrixToQuaternionRaw);
+        let other_means =
+            self.strategy.rotation == RotationChoice::DualQuaternion || self.scales_with_faces();
+        let keeps_size = self.strategy.covariance == CovarianceChoice::Rotate && !converted;
+        let known = self.bound.moves == Moves::ByWeights && keeps_size && !other_means;
+        Self { sight: known.then(|| Sight::new(camera)), ..self }
     }
 
     /// Visits the blocks of a chunk, whose first Gaussian has index `start`, with the instructions of this processor.
@@ -136,6 +150,10 @@ impl<V: Visitor> pulp::WithSimd for Walk<'_, '_, V> {
             let (indices, weights) = chunk.influences(block);
             let blend = Blend::new(&frame.joints, indices, weights);
             let input = BlockInput { joints: &frame.joints, chunk, block, start, blend: &blend };
+            if let Some(means) = frame.sight.as_ref().and_then(|sight| sight.hides(block, &blend)) {
+                visitor.unseen(&input, &means);
+                continue;
+            }
             let turn = turn(frame.arch, &frame.source, &input);
             let scales = if frame.scales_with_faces() { frame.grown(&input) } else { block.scales };
             visitor.block(position, &input, &turn, &scales);

@@ -18,6 +18,7 @@
 //! [`Posed`]: crate::scene::Posed
 
 mod adjoint;
+mod auto;
 mod bake;
 mod blend;
 mod bound;
@@ -30,20 +31,23 @@ mod frame;
 mod joints;
 mod layout;
 pub mod nearest;
+pub mod needs;
 mod pose;
 mod presets;
 mod rest_faces;
 mod rotate;
 mod seat;
+mod sight;
 mod spec;
 mod surfel;
 
 pub use adjoint::pose_backward;
+pub use auto::{Auto, CANDIDATES, Choice, Resolved, Views};
 pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;
 pub use choices::{
     ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
 };
 pub use error::StrategyError;
-pub use pose::{PoseBuffers, pose, pose_into};
+pub use pose::{PoseBuffers, pose, pose_into, pose_seen};
 pub use presets::{PRESETS, Preset};

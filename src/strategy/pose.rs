@@ -9,8 +9,8 @@ use super::{
     BoundAvatar, ColourChoice, CovarianceChoice, LbsProjection, RotationChoice, Strategy, StrategyError,
     colour,
 };
-use crate::math::Quaternion;
-use crate::scene::{Posed, PosedBody};
+use crate::math::{Quaternion, rotation};
+use crate::scene::{Camera, Posed, PosedBody};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -30,7 +30,7 @@ pub fn pose<'a>(
     body: &PosedBody<'_>,
     strategy: &Strategy,
 ) -> Result<Posed<'a>, StrategyError> {
-    pose_on(pulp::Arch::new(), bound, body, strategy, &mut PoseBuffers::default())
+    pose_on(pulp::Arch::new(), bound, body, strategy, None, &mut PoseBuffers::default())
 }
 
 /// [`pose`] into memory that a pose of before has left: at 100,000 Gaussians fresh memory costs as much as the work.
@@ -43,7 +43,23 @@ pub fn pose_into<'a>(
     strategy: &Strategy,
     buffers: &mut PoseBuffers,
 ) -> Result<Posed<'a>, StrategyError> {
-    pose_on(pulp::Arch::new(), bound, body, strategy, buffers)
+    pose_on(pulp::Arch::new(), bound, body, strategy, None, buffers)
+}
+
+/// [`pose_into`] for one camera: Gaussians that it surely does not see are moved, but neither turned nor coloured. The
+/// image has the same bits as that of [`pose`]. For Gaussians with weights of their own and covariances that are rotated;
+/// others are posed in full.
+///
+/// # Errors
+/// As [`pose`]; the buffers are kept.
+pub fn pose_seen<'a>(
+    bound: &'a BoundAvatar,
+    body: &PosedBody<'_>,
+    strategy: &Strategy,
+    camera: &Camera,
+    buffers: &mut PoseBuffers,
+) -> Result<Posed<'a>, StrategyError> {
+    pose_on(pulp::Arch::new(), bound, body, strategy, Some(camera), buffers)
 }
 
 /// Memory of poses that are no longer needed: [`pose_into`] takes it, [`PoseBuffers::reclaim`] gives it back.
@@ -86,9 +102,14 @@ fn pose_on<'a>(
     bound: &'a BoundAvatar,
     body: &PosedBody<'_>,
     strategy: &Strategy,
+    camera: Option<&Camera>,
     buffers: &mut PoseBuffers,
 ) -> Result<Posed<'a>, StrategyError> {
     let frame = Frame::new(arch, bound, body, strategy)?;
+    let frame = match camera {
+        Some(camera) => frame.seen_by(camera),
+        None => frame,
+    };
     let produces = Produces::of(strategy, bound);
     let n = bound.len();
     let mut means = sized(&mut buffers.means, n, Vec3::ZERO);
@@ -179,7 +200,7 @@ struct PoseChunk<'f, 'a, 'o> {
     /// Index of the first Gaussian.
     start: usize,
     outputs: Outputs<'o>,
-    /// R of each Gaussian, for the SH; empty if they stay.
+    /// R of each Gaussian, for the SH, zero for one that is not seen; empty if they stay.
     turns: Vec<Quaternion<f32>>,
 }
 
@@ -198,7 +219,9 @@ impl PoseChunk<'_, '_, '_> {
         for ((turn, input), output) in
             self.turns.iter().zip(input).zip(self.outputs.sh.chunks_exact_mut(count))
         {
-            colour::rotate_sh(*turn, degree, input, output);
+            if *turn != [0.0; 4] {
+                colour::rotate_sh(*turn, degree, input, output);
+            }
         }
     }
 
@@ -254,6 +277,23 @@ impl Visitor for PoseChunk<'_, '_, '_> {
             }
         }
     }
+
+    /// What is left of a Gaussian that is not drawn has a place and no extent.
+    #[inline(always)]
+    fn unseen(&mut self, input: &BlockInput<'_>, means: &[Lanes; 3]) {
+        let outputs = &mut self.outputs;
+        for lane in 0..input.block.count {
+            let i = usize::from(input.block.index[lane]);
+            outputs.means[i] = Vec3::new(means[0][lane], means[1][lane], means[2][lane]);
+            outputs.factors[i] = Mat3::ZERO;
+            if let Some(rotation) = outputs.rotations.get_mut(i) {
+                *rotation = rotation::identity();
+            }
+            if let Some(frame) = outputs.view_frames.get_mut(i) {
+                *frame = Mat3::IDENTITY;
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -302,9 +342,15 @@ mod tests {
         let at = Pose::from_axis_angles(&body.skeleton, &angles, DVec3::Z);
         let body = PosedBody::new(&body, &at).unwrap();
         for preset in PRESETS {
-            let narrow =
-                pose_on(pulp::Arch::Scalar, &bound, &body, &preset.strategy, &mut PoseBuffers::default())
-                    .unwrap();
+            let narrow = pose_on(
+                pulp::Arch::Scalar,
+                &bound,
+                &body,
+                &preset.strategy,
+                None,
+                &mut PoseBuffers::default(),
+            )
+            .unwrap();
             assert_eq!(narrow, pose(&bound, &body, &preset.strategy).unwrap(), "{}", preset.id);
 
             // The pose serves as its own derivative.

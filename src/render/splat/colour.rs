@@ -101,9 +101,10 @@ fn sum<const K: usize, L: Lanes>(l: L, coefficients: &[[f32; 3]], basis: impl Fn
             sums[k % 2] = l.mul_add_four(basis(k), four, sums[k % 2]);
         }
     }
+    // In the place that it has among more coefficients, so that those of higher degrees that are 0 change nothing.
     let [r, g, b] = coefficients[K - 1];
-    let last = l.mul_add_four(basis(K - 1), &[r, g, b, 0.0], sums[1]);
-    [sums[0][0] + last[0], sums[0][1] + last[1], sums[0][2] + last[2]]
+    sums[(K - 1) % 2] = l.mul_add_four(basis(K - 1), &[r, g, b, 0.0], sums[(K - 1) % 2]);
+    [sums[0][0] + sums[1][0], sums[0][1] + sums[1][1], sums[0][2] + sums[1][2]]
 }
 
 /// The clamp that follows.

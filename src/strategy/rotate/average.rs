@@ -2,13 +2,14 @@
 //!
 //! One joint is its own average; two have a closed form that reads nothing but their inner product, which the block
 //! shares; three or more come from the blend that moves the means. A lane too close to a tie for `f32` is decided in
-//! `f64` by [`average_rotation`]. Other solvers run one Gaussian at a time, in `f64`.
+//! `f64` by [`average_rotation`]. The heaviest joint alone and the normalised sum are vector code as well; other solvers
+//! run one Gaussian at a time, in `f64`.
 
 use super::super::blend::{self, Blend};
 use super::super::joints::Joints;
 use super::super::layout::{LANES, Lanes};
 use super::put;
-use crate::math::average::{Solver, average_rotation, lanes};
+use crate::math::average::{Solver, Start, average_rotation, lanes};
 use crate::math::{Quaternion, rotation};
 
 /// Below this gap of the eigenvalues (over their sum) two joints are decided in `f64`.
@@ -45,8 +46,60 @@ pub(super) fn average(
             settle(joints, indices, weights, &settled, &mut quats);
             quats
         }
+        (_, Solver::Power { steps: 0, start: Start::Heaviest }) => heaviest(joints, indices, weights),
+        (_, Solver::Nlerp) => normalised_sum(joints, indices, weights)
+            .unwrap_or_else(|| one_by_one(joints, indices, weights, solver)),
         _ => one_by_one(joints, indices, weights, solver),
     }
+}
+
+/// The rotation of the heaviest joint of each lane, the first of equals: power iteration that has not begun.
+#[inline(always)]
+fn heaviest(joints: &Joints, indices: &[u16], weights: &[Lanes]) -> [Lanes; 4] {
+    let mut quats = splat(joints.rotation[usize::from(indices[0])]);
+    let mut largest = weights[0];
+    for (&joint, weight) in indices.iter().zip(weights).skip(1) {
+        let own = joints.rotation[usize::from(joint)];
+        for lane in 0..LANES {
+            let heavier = weight[lane] > largest[lane];
+            largest[lane] = if heavier { weight[lane] } else { largest[lane] };
+            for k in 0..4 {
+                quats[k][lane] = if heavier { own[k] } else { quats[k][lane] };
+            }
+        }
+    }
+    quats
+}
+
+/// A cosine of quaternions below which `f32` might not know its sign.
+const SURE_COSINE: f32 = 1e-5;
+
+/// [`Solver::Nlerp`], a block at a time; `None` if a side cannot be told in `f32`.
+#[inline(always)]
+fn normalised_sum(joints: &Joints, indices: &[u16], weights: &[Lanes]) -> Option<[Lanes; 4]> {
+    let reference = heaviest(joints, indices, weights);
+    let (mut sum, mut least) = ([[0.0; LANES]; 4], [1.0_f32; LANES]);
+    for (&joint, weight) in indices.iter().zip(weights) {
+        let [w, x, y, z] = joints.rotation[usize::from(joint)];
+        for lane in 0..LANES {
+            let cosine = (w * reference[0][lane] + x * reference[1][lane])
+                + (y * reference[2][lane] + z * reference[3][lane]);
+            least[lane] = least[lane].min(cosine.abs());
+            let weight = weight[lane].copysign(cosine);
+            sum[0][lane] += weight * w;
+            sum[1][lane] += weight * x;
+            sum[2][lane] += weight * y;
+            sum[3][lane] += weight * z;
+        }
+    }
+    for lane in 0..LANES {
+        let [w, x, y, z] = [sum[0][lane], sum[1][lane], sum[2][lane], sum[3][lane]];
+        let inverse = 1.0 / ((w * w + x * x) + (y * y + z * z)).sqrt();
+        for k in 0..4 {
+            sum[k][lane] *= inverse;
+        }
+    }
+    least.iter().all(|&cosine| cosine > SURE_COSINE).then_some(sum)
 }
 
 /// Three joints or more. A function of its own, small enough for the compiler to inline all that is in it.

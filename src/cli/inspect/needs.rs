@@ -1,0 +1,148 @@
+//! `reproduce inspect --needs`: what an avatar and a motion need.
+
+use super::super::output::{Format, emit, emit_json};
+use super::line;
+use crate::data::{body, ply, poses};
+use crate::scene::{Binding, Body, Pose, RestBody};
+use crate::strategy::needs::{Degrees, Extreme, Needs};
+use crate::strategy::{BoundAvatar, RotationChoice};
+use anyhow::{Context as _, Result, bail};
+use std::path::{Path, PathBuf};
+
+/// Pairs that are listed; JSON has them all.
+const LISTED_PAIRS: usize = 12;
+
+/// The motion, and what is asked of it.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Needs")]
+pub(super) struct Motion {
+    /// Say what FILE, an avatar, needs in a motion: SH degree, influences, joints, angles, and which solvers are enough
+    #[arg(long, requires = "poses")]
+    needs: bool,
+    /// Poses: .npz, transforms.json, or a .glb or .gltf with clips
+    #[arg(long, value_name = "POSES", requires = "needs")]
+    poses: Option<PathBuf>,
+    /// Body model [default: the poses' file if it is glTF, else the one that the avatar names]
+    #[arg(long, value_name = "BODY", requires = "needs")]
+    body: Option<PathBuf>,
+    /// Clip of a glTF file with several
+    #[arg(long, value_name = "NAME", requires = "needs")]
+    clip: Option<String>,
+    /// Degrees by which a rotation may differ from the exact average
+    #[arg(long, value_name = "DEG", requires = "needs", default_value_t = 0.5, value_parser = tolerance)]
+    tolerance: f64,
+    /// Bound this rotation choice instead of the usual ones (may be repeated)
+    #[arg(long = "rotation", value_name = "ID", requires = "needs")]
+    rotations: Vec<RotationChoice>,
+    /// How the needs are printed
+    #[arg(long, value_enum, default_value_t, requires = "needs")]
+    format: Format,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    let choice: crate::strategy::Choice = format!("auto:{text}").parse().map_err(|e| format!("{e}"))?;
+    match choice {
+        crate::strategy::Choice::Auto(auto) => Ok(auto.tolerance),
+        crate::strategy::Choice::Fixed(_) => Err("expected a number of degrees".to_owned()),
+    }
+}
+
+impl Motion {
+    /// True if needs were asked for.
+    pub(super) fn asked(&self) -> bool {
+        self.needs
+    }
+
+    /// Prints what the avatar needs.
+    pub(super) fn print(&self, avatar: &Path) -> Result<()> {
+        let stored = ply::read(avatar)?;
+        if matches!(stored.avatar.binding, Binding::Static) {
+            let expected = "joint and weight properties, or face, barycentric and offset properties";
+            bail!("{}: no binding; expected {expected}", avatar.display());
+        }
+        let path = self.poses.as_deref().context("--poses is missing")?;
+        let track = poses::load_clip(path, self.clip.as_deref())?;
+        let (body_path, model) = self.model(avatar, path, stored.body.as_deref())?;
+        let rest = model.shaped(&track.betas).with_context(|| format!("{}", path.display()))?;
+        let motion: Vec<Pose> = track.poses(&rest.skeleton)?;
+        let bound = BoundAvatar::new(&stored.avatar, &rest).with_context(|| {
+            format!("{}: does not fit the body {}", avatar.display(), body_path.display())
+        })?;
+        let choices = if self.rotations.is_empty() { Needs::listed() } else { self.rotations.clone() };
+        let needs = Needs::new(&bound, &rest, &motion, &choices, self.tolerance)?;
+        match self.format {
+            Format::Json => emit_json(&needs),
+            Format::Text => emit(&format!("{}\n{}", avatar.display(), text(&needs, &rest))),
+        }
+    }
+
+    fn model(&self, avatar: &Path, poses: &Path, named: Option<&str>) -> Result<(PathBuf, Body)> {
+        let is_rig = poses.extension().is_some_and(|e| e == "glb" || e == "gltf");
+        let path = match (&self.body, named) {
+            (Some(path), _) => path.clone(),
+            (None, _) if is_rig => poses.to_owned(),
+            (None, Some(named)) => avatar.parent().unwrap_or(Path::new("")).join(named),
+            (None, None) => {
+                bail!("--body is missing: neither the poses nor {} name a body", avatar.display())
+            }
+        };
+        let model = body::load(&path)?;
+        Ok((path, model))
+    }
+}
+
+fn text(needs: &Needs, body: &RestBody) -> String {
+    let mut text = line("Gaussians", needs.gaussians) + &line("poses", needs.poses);
+    text += &line("SH degree", format!("{} of {} stored", needs.sh_degree_present, needs.sh_degree_stored));
+    let share = |(n, count): (usize, &u64)| {
+        (*count > 0)
+            .then(|| format!("{n}: {count} ({:.1} %)", 100.0 * *count as f64 / needs.gaussians.max(1) as f64))
+    };
+    let shares: Vec<String> = needs.influences.iter().enumerate().filter_map(share).collect();
+    text += &line("influences", shares.join(", "));
+    text += &line("joints used", format!("{} of {}", needs.joints_used.len(), needs.joints));
+    let name = |joint: u16| match body.skeleton.names.get(usize::from(joint)) {
+        Some(name) if !name.is_empty() => name.clone(),
+        _ => joint.to_string(),
+    };
+    text += &line("worst bone angle", at(needs.worst_angle, "°"));
+    text += &line("smallest gap", needs.gap.map_or("not searched for".to_owned(), |gap| at(gap, "")));
+    text += &line("its bound", at(needs.gap_bound, ""));
+    let mut widest: Vec<_> = needs.pairs.iter().collect();
+    widest.sort_by(|a, b| b.worst_angle.value.total_cmp(&a.worst_angle.value));
+    text += "  joints that share Gaussians, widest first\n";
+    for pair in widest.iter().take(LISTED_PAIRS) {
+        let [a, b] = pair.joints.map(name);
+        let value = format!("{}, {} Gaussians", at(pair.worst_angle, "°"), pair.gaussians);
+        text += &format!("    {:<24} {value}\n", format!("{a} - {b}"));
+    }
+    if widest.len() > LISTED_PAIRS {
+        text += &format!("    and {} more\n", widest.len() - LISTED_PAIRS);
+    }
+    text += "  farthest from the exact average that it can be (proved + rounding to f32)\n";
+    for bound in &needs.bounds {
+        text += &format!("    {:<24} {}\n", bound.rotation.to_string(), bound.degrees);
+    }
+    text += "  exact average of the heaviest influences only\n";
+    for (kept, degrees) in needs.fewer_influences.iter().enumerate() {
+        text += &format!("    {:<24} {degrees}\n", kept + 1);
+    }
+    let picks = needs.verdict.picks.iter().map(|pick| {
+        let name = pick.rotation.map_or("none".to_owned(), |rotation| rotation.to_string());
+        format!("{name} in {}", poses_text(pick.poses))
+    });
+    text += &line(&format!("auto:{} picks", needs.verdict.tolerance), picks.collect::<Vec<_>>().join(", "));
+    text + &line("verdict", &needs.verdict)
+}
+
+fn poses_text(n: usize) -> String {
+    if n == 1 { "1 pose".to_owned() } else { format!("{n} poses") }
+}
+
+fn at(extreme: Extreme, unit: &str) -> String {
+    let value = match unit {
+        "°" => Degrees(extreme.value).to_string(),
+        _ => format!("{:.6}", extreme.value),
+    };
+    format!("{value} in pose {}", extreme.pose)
+}
