@@ -3,7 +3,7 @@
 use super::{Context, Exit, posing::Posing};
 use crate::data::ply;
 use crate::scene::{Avatar, Binding};
-use crate::strategy::bake;
+use crate::strategy::{RotationChoice, Strategy, bake};
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 
@@ -18,8 +18,20 @@ pub(super) struct Skin {
     /// The posed Gaussians to write
     #[arg(long, value_name = "POSED.ply")]
     out: PathBuf,
+    /// Blend the quaternions of the average with signs that do not let it jump where bones pass 180 degrees
+    #[arg(long, value_enum, value_name = "REFERENCE")]
+    continuity: Option<Continuity>,
     #[command(flatten)]
     posing: Posing,
+}
+
+/// What the signs of joint quaternions stay close to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Continuity {
+    /// The frame before: the track is followed from its first pose to --frame
+    Previous,
+    /// The rest pose of the parent joint, without a memory: the strategy axis rotation=lifted-sum
+    Rest,
 }
 
 impl Skin {
@@ -28,9 +40,12 @@ impl Skin {
             bail!("--body is missing: an avatar is posed by a body");
         }
         let subject = self.posing.load(&self.avatar)?;
-        let strategy = self.posing.strategy();
+        let strategy = &self.strategy()?;
         let canonical = &subject.avatar().gaussians;
-        let baked = subject.posed(strategy, |posed| Ok(bake(posed, canonical)))?;
+        let baked = match self.continuity {
+            Some(Continuity::Previous) => subject.posed_following(strategy, |p| Ok(bake(p, canonical)))?,
+            Some(Continuity::Rest) | None => subject.posed(strategy, |p| Ok(bake(p, canonical)))?,
+        };
         let avatar = Avatar { gaussians: baked.gaussians, binding: Binding::Static };
         let metadata = ply::Metadata { body: None, comments: vec![format!("posed by {strategy}")] };
         ply::write_avatar(&self.out, &avatar, &metadata, ply::Encoding::LittleEndian)?;
@@ -38,5 +53,21 @@ impl Skin {
             context.note(format!("{}: {loss}", self.out.display()));
         }
         Ok(Exit::Success)
+    }
+
+    /// The strategy, its average made a sum of quaternions with signs if continuity was asked for.
+    fn strategy(&self) -> Result<Strategy> {
+        let strategy = *self.posing.strategy();
+        if self.continuity.is_none() {
+            return Ok(strategy);
+        }
+        match strategy.rotation {
+            RotationChoice::QuaternionAverage(_) | RotationChoice::LiftedSum => {
+                Ok(Strategy { rotation: RotationChoice::LiftedSum, ..strategy })
+            }
+            other => {
+                bail!("--continuity with rotation={other}; expected a quaternion average, which it continues")
+            }
+        }
     }
 }

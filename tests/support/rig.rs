@@ -161,6 +161,6 @@ pub(crate) fn equivariant(rotation: RotationChoice) -> bool {
         RotationChoice::QuaternionAverage(solver) | RotationChoice::VertexAverage(solver) => {
             !matches!(solver, Solver::Squaring { .. })
         }
-        RotationChoice::FaceFrame(_) | RotationChoice::DualQuaternion => true,
+        RotationChoice::FaceFrame(_) | RotationChoice::LiftedSum | RotationChoice::DualQuaternion => true,
     }
 }
