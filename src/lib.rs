@@ -33,3 +33,4 @@ pub mod report;
 pub mod run;
 pub mod scene;
 pub mod strategy;
+pub mod stress;

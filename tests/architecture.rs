@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 /// Module, layer, and same-layer modules that it may import all the same.
-const LAYERS: [(&str, u8, &[&str]); 11] = [
+const LAYERS: [(&str, u8, &[&str]); 12] = [
     ("math", 0, &[]),
     ("scene", 1, &[]),
     ("strategy", 2, &[]),
@@ -15,6 +15,7 @@ const LAYERS: [(&str, u8, &[&str]); 11] = [
     ("fit", 5, &[]),
     ("run", 5, &["fit"]),
     ("report", 5, &["run"]),
+    ("stress", 5, &[]),
     ("cli", 6, &[]),
 ];
 

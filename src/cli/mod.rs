@@ -19,6 +19,7 @@ mod run;
 mod score;
 mod selection;
 mod skin;
+mod stress;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -56,6 +57,7 @@ enum Command {
     Score(score::Score),
     Blend(blend::Blend),
     Inspect(inspect::Inspect),
+    Stress(stress::Stress),
     Completions(completions::Completions),
 }
 
@@ -129,6 +131,7 @@ impl Command {
             Self::Score(command) => command.run(context),
             Self::Blend(command) => command.run(),
             Self::Inspect(command) => command.run(),
+            Self::Stress(command) => command.run(context),
             Self::Completions(command) => command.run(),
         }
     }
