@@ -4,14 +4,13 @@
 
 #[path = "support/random_scene.rs"]
 mod random_scene;
-#[path = "support/reference_splatting.rs"]
-mod reference_splatting;
 
 use glam::{Mat3, Vec3};
 use proptest::prelude::*;
 use random_scene::{Random, camera, chosen, posed};
 use skinsplat::render::splat::{Derivatives, RenderSettings, Renderer, SimdLevel};
 use skinsplat::scene::{Camera, ColourClamp, Image, Mask, Posed, PosedGradient, RenderedGradient};
+use skinsplat::stress::definition as reference_splatting;
 
 /// Everything that a loss needs, from a seed.
 struct Scene {

@@ -4,7 +4,7 @@ use super::output::emit;
 use super::progress::Watch;
 use super::{Context, Exit};
 use crate::data::{atomic, frames};
-use crate::stress::{self, Report, Section};
+use crate::stress::{Report, Section};
 use anyhow::{Context as _, Result};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -50,7 +50,7 @@ impl Stress {
         let mut findings = Vec::new();
         let mut pictures = Vec::new();
         for section in sections {
-            let examined = stress::examine(section, self.quick);
+            let examined = section.examine(self.quick)?;
             findings.push(examined.findings);
             pictures.extend(examined.pictures);
             watch.see(crate::run::Event::FrameDone);

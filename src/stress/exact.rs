@@ -58,13 +58,6 @@ impl Exact {
     pub(super) fn loss(&self, q: Quaternion<f64>) -> f64 {
         (1.0 - dot4(q, self.scaled.map(|row| dot4(row, q)))).max(0.0)
     }
-
-    /// The average where it is unique; either sign.
-    pub(super) fn quaternion(&self) -> Option<Quaternion<f64>> {
-        let best = (0..4).max_by(|&i, &j| self.projector[i][i].total_cmp(&self.projector[j][j]))?;
-        let length = self.projector[best][best].sqrt();
-        (self.dimensions == 1).then(|| self.projector[best].map(|c| c / length))
-    }
 }
 
 /// Σ w q qᵀ of unit quaternions, weights relative to the heaviest.
@@ -107,4 +100,49 @@ fn product(a: &Matrix4<DoubleDouble>, b: &Matrix4<DoubleDouble>) -> Matrix4<Doub
         }
     }
     product
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+
+    fn numbers(value: &Value) -> Vec<f64> {
+        value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+    }
+
+    fn quaternion(value: &Value) -> Quaternion<f64> {
+        numbers(value).try_into().unwrap()
+    }
+
+    /// The fixtures' answers have fifty digits, written with seventeen.
+    #[test]
+    fn the_reference_set_agrees() {
+        let mut seen = [0; 2];
+        for file in ["random", "extreme"] {
+            let path = format!("{}/tests/data/fixtures/rotation/{file}.json", env!("CARGO_MANIFEST_DIR"));
+            let cases: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+            for case in cases.as_array().unwrap() {
+                let quats: Vec<_> = case["quats_wxyz"].as_array().unwrap().iter().map(quaternion).collect();
+                let exact = Exact::new(&quats, &numbers(&case["weights"])).unwrap();
+                let name = &case["name"];
+                if case["degenerate"].as_bool().unwrap() {
+                    seen[1] += 1;
+                    let basis = case["top_eigenspace_basis_wxyz"].as_array().unwrap();
+                    assert_eq!(exact.dimensions, basis.len(), "{name}");
+                    for axis in basis {
+                        assert!(exact.error_degrees(quaternion(axis)) < 1e-13, "{name}");
+                    }
+                } else {
+                    seen[0] += 1;
+                    let answer = quaternion(&case["markley_wxyz"]);
+                    // Seventeen digits are 1e-16, twice that as an angle.
+                    assert!(exact.error_degrees(answer) < 5e-14, "{name}: {}", exact.error_degrees(answer));
+                    assert!(exact.loss(answer) < 1e-15, "{name}: {}", exact.loss(answer));
+                    assert_eq!(exact.dimensions, 1, "{name}");
+                }
+            }
+        }
+        assert!(seen[0] > 490 && seen[1] > 2, "{seen:?}");
+    }
 }

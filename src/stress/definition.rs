@@ -1,9 +1,9 @@
-//! The definition of the 3DGS image, in f64, pixel by pixel and splat by splat, with nothing clever.
-#![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "shared by tests")]
+//! The definition of the 3DGS image, in `f64`, pixel by pixel and splat by splat, with nothing clever: what the renderer
+//! is held against, here and in its tests.
 
+use crate::render::splat::RenderSettings;
+use crate::scene::{Camera, ColourClamp, Posed};
 use glam::{DMat2, DMat3, DVec2, DVec3};
-use skinsplat::render::splat::RenderSettings;
-use skinsplat::scene::{Camera, ColourClamp, Posed};
 
 struct Splat {
     /// Of its Gaussian.
@@ -40,7 +40,7 @@ pub fn render_chosen(
     let splats: Vec<Option<Splat>> = (0..posed.len()).map(|i| project(posed, i, camera, settings)).collect();
     let background = DVec3::from_array(settings.background.map(f64::from));
     std::iter::zip(pixels(camera), chosen)
-        .map(|(pixel, chosen)| blend(chosen.iter().map(|&i| splats[i].as_ref().unwrap()), pixel, background))
+        .map(|(pixel, chosen)| blend(chosen.iter().filter_map(|&i| splats[i].as_ref()), pixel, background))
         .collect()
 }
 
