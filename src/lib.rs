@@ -34,4 +34,5 @@ pub mod run;
 pub mod savings;
 pub mod scene;
 pub mod strategy;
+pub mod stress;
 pub mod trade;

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 /// Module, layer, and same-layer modules that it may import all the same.
-const LAYERS: [(&str, u8, &[&str]); 13] = [
+const LAYERS: [(&str, u8, &[&str]); 14] = [
     ("math", 0, &[]),
     ("scene", 1, &[]),
     ("strategy", 2, &[]),
@@ -17,6 +17,7 @@ const LAYERS: [(&str, u8, &[&str]); 13] = [
     ("report", 5, &["run"]),
     ("trade", 5, &["run", "fit", "report"]),
     ("savings", 5, &["fit"]),
+    ("stress", 5, &[]),
     ("cli", 6, &[]),
 ];
 

@@ -4,12 +4,11 @@
 
 #[path = "support/random_scene.rs"]
 mod random_scene;
-#[path = "support/reference_splatting.rs"]
-mod reference_splatting;
 
 use glam::{Mat3, Vec3};
 use proptest::prelude::*;
 use random_scene::{Random, camera, chosen, posed};
+use skinsplat::render::definition as reference_splatting;
 use skinsplat::render::splat::{Derivatives, RenderSettings, Renderer, SimdLevel};
 use skinsplat::scene::{Camera, ColourClamp, Image, Mask, Posed, PosedGradient, RenderedGradient};
 

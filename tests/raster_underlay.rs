@@ -4,13 +4,12 @@
 
 #[path = "support/random_scene.rs"]
 mod random_scene;
-#[path = "support/reference_splatting.rs"]
-mod reference_splatting;
 
 use glam::{DVec3, Mat3, Vec3};
 use proptest::prelude::*;
 use random_scene::{Random, camera, posed};
-use reference_splatting::{Pane, Parted};
+use skinsplat::render::definition as reference_splatting;
+use skinsplat::render::definition::{Pane, Parted};
 use skinsplat::render::mesh::{Mesh, SamplePattern, draw};
 use skinsplat::render::splat::{Derivatives, RenderSettings, Renderer, SimdLevel, render};
 use skinsplat::scene::{

@@ -19,6 +19,7 @@ mod run;
 mod score;
 mod selection;
 mod skin;
+mod stress;
 mod trade;
 
 use clap::error::ErrorKind;
@@ -58,6 +59,7 @@ enum Command {
     Blend(blend::Blend),
     Trade(trade::Trading),
     Inspect(inspect::Inspect),
+    Stress(stress::Stress),
     Completions(completions::Completions),
 }
 
@@ -132,6 +134,7 @@ impl Command {
             Self::Blend(command) => command.run(),
             Self::Trade(command) => command.run(context),
             Self::Inspect(command) => command.run(),
+            Self::Stress(command) => command.run(context),
             Self::Completions(command) => command.run(),
         }
     }

@@ -1,8 +1,8 @@
 //! An avatar, a body, a frame of a pose track and a strategy: the arguments of `render` and `skin`.
 
 use crate::data::{body, ply, poses};
-use crate::scene::{Avatar, Binding, Pose, Posed, PosedBody, RestBody};
-use crate::strategy::{self, BoundAvatar, Choice, Resolved, Views};
+use crate::scene::{Avatar, Binding, Body, Pose, Posed, PosedBody, RestBody};
+use crate::strategy::{self, BoundAvatar, Choice, JointLift, PoseBuffers, Resolved, Strategy, Views};
 use anyhow::{Context as _, Result, bail};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +32,8 @@ pub(super) struct Posing {
 pub(super) struct Subject {
     avatar: Avatar,
     rest: Option<(RestBody, Pose)>,
+    /// The poses of the track before this one.
+    before: Vec<Pose>,
 }
 
 impl Posing {
@@ -52,35 +54,38 @@ impl Posing {
             if !matches!(loaded.binding, Binding::Static) {
                 loaded.binding = Binding::Static;
             }
-            return Ok(Subject { avatar: loaded, rest: None });
+            return Ok(Subject { avatar: loaded, rest: None, before: Vec::new() });
         };
         if matches!(loaded.binding, Binding::Static) {
             let expected = "joint and weight properties, or face, barycentric and offset properties";
             bail!("{}: no binding; expected {expected}, to pose it with --body", avatar.display());
         }
         let model = body::load(body_path)?;
-        let (rest, pose) = match &self.poses {
+        let (rest, pose, before) = match &self.poses {
             None => {
                 let rest = model.shaped(&[])?;
                 let pose = Pose::rest(&rest.skeleton);
-                (rest, pose)
+                (rest, pose, Vec::new())
             }
-            Some(path) => self.pose_of_frame(path, &model)?,
+            Some(path) => self.poses_to_frame(path, &model)?,
         };
         loaded.validate(Some(&rest)).with_context(|| {
             format!("{}: does not fit the body {}", avatar.display(), body_path.display())
         })?;
-        Ok(Subject { avatar: loaded, rest: Some((rest, pose)) })
+        Ok(Subject { avatar: loaded, rest: Some((rest, pose)), before })
     }
 
-    fn pose_of_frame(&self, path: &Path, model: &crate::scene::Body) -> Result<(RestBody, Pose)> {
+    /// The body in its shape, the pose of the frame and those before it.
+    fn poses_to_frame(&self, path: &Path, model: &Body) -> Result<(RestBody, Pose, Vec<Pose>)> {
         let track = poses::load_clip(path, self.clip.as_deref())?;
         let rest = model.shaped(&track.betas).with_context(|| format!("{}", path.display()))?;
         let mut poses = track.poses(&rest.skeleton)?;
         if self.frame >= poses.len() {
             bail!("{}: --frame {}; expected a frame below {}", path.display(), self.frame, poses.len());
         }
-        Ok((rest, poses.swap_remove(self.frame)))
+        poses.truncate(self.frame + 1);
+        let pose = poses.remove(self.frame);
+        Ok((rest, pose, poses))
     }
 }
 
@@ -107,6 +112,25 @@ impl Subject {
                 use_posed(&strategy::pose(&bound, &body, &resolved.strategy)?, Some(&resolved))
             }
         }
+    }
+
+    /// [`Subject::posed`] with the signs of joint quaternions followed through the track, from its first pose to this one.
+    pub(super) fn posed_following<T>(
+        &self,
+        strategy: &Strategy,
+        use_posed: impl FnOnce(&Posed) -> Result<T>,
+    ) -> Result<T> {
+        let Some((rest, pose)) = &self.rest else {
+            return use_posed(&Posed::from_static(&self.avatar.gaussians));
+        };
+        let mut lift: Option<JointLift> = None;
+        for earlier in &self.before {
+            lift = Some(JointLift::next(lift.as_ref(), &PosedBody::new(rest, earlier)?));
+        }
+        let body = PosedBody::new(rest, pose)?;
+        let lift = JointLift::next(lift.as_ref(), &body);
+        let bound = BoundAvatar::new(&self.avatar, rest)?;
+        use_posed(&strategy::pose_lifted(&bound, &body, strategy, &lift, &mut PoseBuffers::default())?)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Dual quaternions: rigid motions blended linearly (Kavan et al. 2007, "Skinning with Dual Quaternions").
 
-use super::rotation::{multiply, normalize, quaternion_to_matrix_raw};
+use super::rotation::{is_opposite, multiply, normalize, quaternion_to_matrix_raw};
 use super::{Quaternion, Real, dot4, matrix3};
 
 /// A unit dual quaternion `real + ε dual`: x' = R(real) x + t with dual = ½ t ⊗ real.
@@ -57,7 +57,7 @@ pub fn blend<T: Real>(motions: &[DualQuaternion<T>], weights: &[T]) -> Option<Du
     let (mut real, mut dual) = ([T::ZERO; 4], [T::ZERO; 4]);
     for (motion, &weight) in motions.iter().zip(weights) {
         let relative = weight / heaviest.0;
-        let factor = if dot4(motion.real, reference) < T::ZERO { -relative } else { relative };
+        let factor = if is_opposite(motion.real, reference) { -relative } else { relative };
         for k in 0..4 {
             real[k] += factor * motion.real[k];
             dual[k] += factor * motion.dual[k];

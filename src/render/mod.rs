@@ -1,4 +1,5 @@
-//! From geometry and a camera to an image: [`splat`] draws Gaussians, [`mesh`] draws triangles.
+//! From geometry and a camera to an image: [`splat`] draws Gaussians, [`mesh`] draws triangles. [`definition`] is the oracle.
 
+pub mod definition;
 pub mod mesh;
 pub mod splat;

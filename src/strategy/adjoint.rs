@@ -51,7 +51,7 @@ pub(super) fn backward_on(
     upstream: &PosedGradient,
     gradient: &mut AvatarGradient,
 ) -> Result<(), StrategyError> {
-    let frame = Frame::new(arch, bound, body, strategy)?;
+    let frame = Frame::new(arch, bound, body, strategy, None)?;
     check(bound, gaussians, upstream, gradient)?;
     let parts = Part::split(gradient, bound.sh_count());
     parts.into_par_iter().enumerate().for_each(|(number, gradient)| {

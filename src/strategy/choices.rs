@@ -69,6 +69,9 @@ pub enum RotationChoice {
     VertexAverage(Solver),
     /// SplattingAvatar: face rotations summed at vertices (rest areas), vertex quaternions summed barycentrically.
     VertexQuaternions(SignPolicy),
+    /// The normalised sum of the joints' quaternions with signs that belong together ([`JointLift`](super::JointLift)):
+    /// as the average for nearby joints, and continuous where that jumps.
+    LiftedSum,
     /// Dual-quaternion blending; the mean of a Gaussian with weights of its own follows it too.
     DualQuaternion,
 }
@@ -120,7 +123,7 @@ const SOLVERS: &str = "closed-form, eigen, polar, nlerp, power-N[-START], squari
 impl RotationChoice {
     /// The choices whose id takes no parameter. The ids of [`Solver`] stand for [`RotationChoice::QuaternionAverage`],
     /// and `vertex-average-` may be followed by one.
-    pub const NAMED: [Self; 14] = [
+    pub const NAMED: [Self; 15] = [
         Self::Lbs(LbsProjection::GramSchmidtColumns),
         Self::Lbs(LbsProjection::GramSchmidtRows),
         Self::Lbs(LbsProjection::MatrixToQuaternionRaw),
@@ -134,6 +137,7 @@ impl RotationChoice {
         Self::VertexQuaternions(SignPolicy::NonNegativeW),
         Self::VertexQuaternions(SignPolicy::LargestPositive),
         Self::VertexQuaternions(SignPolicy::AlignToFirst),
+        Self::LiftedSum,
         Self::DualQuaternion,
     ];
 
@@ -141,7 +145,7 @@ impl RotationChoice {
     pub fn needs_faces(self) -> bool {
         match self {
             Self::FaceFrame(_) | Self::VertexAverage(_) | Self::VertexQuaternions(_) => true,
-            Self::Lbs(_) | Self::QuaternionAverage(_) | Self::DualQuaternion => false,
+            Self::Lbs(_) | Self::QuaternionAverage(_) | Self::LiftedSum | Self::DualQuaternion => false,
         }
     }
 }
@@ -164,6 +168,7 @@ impl fmt::Display for RotationChoice {
             Self::VertexQuaternions(SignPolicy::NonNegativeW) => "vertex-quaternions-w",
             Self::VertexQuaternions(SignPolicy::LargestPositive) => "vertex-quaternions-largest",
             Self::VertexQuaternions(SignPolicy::AlignToFirst) => "vertex-quaternions-align",
+            Self::LiftedSum => "lifted-sum",
             Self::DualQuaternion => "dual-quaternion",
         })
     }

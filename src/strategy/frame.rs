@@ -8,8 +8,8 @@ use super::layout::{Chunk, LANES, Lanes};
 use super::rotate::{BlockInput, Source, Turn, turn};
 use super::sight::Sight;
 use super::{
-    BoundAvatar, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
-    StrategyError,
+    BoundAvatar, ColourChoice, CovarianceChoice, FaceFrame, JointLift, LbsProjection, RotationChoice,
+    Strategy, StrategyError,
 };
 use crate::scene::{Camera, PosedBody};
 use glam::{Quat, Vec3};
@@ -38,12 +38,14 @@ pub(super) trait Visitor {
 }
 
 impl<'a> Frame<'a> {
-    /// Everything that is computed once per pose.
+    /// Everything that is computed once per pose. `lift`: of the body, for [`RotationChoice::LiftedSum`]; `None` is that
+    /// from rest.
     pub(super) fn new(
         arch: pulp::Arch,
         bound: &'a BoundAvatar,
         body: &'a PosedBody<'a>,
         strategy: &'a Strategy,
+        lift: Option<&'a JointLift>,
     ) -> Result<Self, StrategyError> {
         bound.check_body(body)?;
         let needs_faces = strategy.rotation.needs_faces() || strategy.covariance == CovarianceChoice::Surfel;
@@ -52,7 +54,7 @@ impl<'a> Frame<'a> {
         }
         let joints = Joints::new(body);
         let source = if reads_rotation(strategy) {
-            Source::new(strategy.rotation, &joints, body, bound.surface.as_ref())
+            Source::new(strategy.rotation, &joints, body, bound.surface.as_ref(), lift)
         } else {
             Source::Identity
         };

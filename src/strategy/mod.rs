@@ -5,7 +5,7 @@
 //!
 //! | axis | choices |
 //! |---|---|
-//! | rotation | [`LbsProjection`] of B, [`FaceFrame`], average of quaternions (per Gaussian or per vertex), dual quaternions |
+//! | rotation | [`LbsProjection`] of B, [`FaceFrame`], average of quaternions (per Gaussian or per vertex), sum of quaternions with signs ([`JointLift`]), dual quaternions |
 //! | covariance | R R_c S² R_cᵀ Rᵀ, or affine: B R_c S² R_cᵀ Bᵀ |
 //! | colour | SH left alone; rotated (Eq. 9); view direction read with Bᵀ or Rᵀ |
 //!
@@ -30,6 +30,7 @@ pub mod face_frame;
 mod frame;
 mod joints;
 mod layout;
+mod lift;
 pub mod nearest;
 pub mod needs;
 mod pose;
@@ -49,5 +50,6 @@ pub use choices::{
     ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
 };
 pub use error::StrategyError;
-pub use pose::{PoseBuffers, pose, pose_into, pose_seen};
+pub use lift::JointLift;
+pub use pose::{PoseBuffers, pose, pose_into, pose_lifted, pose_seen};
 pub use presets::{PRESETS, Preset};

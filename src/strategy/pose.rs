@@ -1,13 +1,13 @@
 //! Canonical avatar and posed body to [`Posed`], a chunk of Gaussians at a time.
 
-use super::bound::Moves;
+use super::bound::{Moves, expect_count};
 use super::covariance::factors;
 use super::frame::{Frame, Visitor};
 use super::layout::{CHUNK, Lanes};
 use super::rotate::{BlockInput, Turn, take};
 use super::{
-    BoundAvatar, ColourChoice, CovarianceChoice, LbsProjection, RotationChoice, Strategy, StrategyError,
-    colour,
+    BoundAvatar, ColourChoice, CovarianceChoice, JointLift, LbsProjection, RotationChoice, Strategy,
+    StrategyError, colour,
 };
 use crate::math::{Quaternion, rotation};
 use crate::scene::{Camera, Posed, PosedBody};
@@ -30,7 +30,7 @@ pub fn pose<'a>(
     body: &PosedBody<'_>,
     strategy: &Strategy,
 ) -> Result<Posed<'a>, StrategyError> {
-    pose_on(pulp::Arch::new(), bound, body, strategy, None, &mut PoseBuffers::default())
+    pose_on(pulp::Arch::new(), bound, body, strategy, &mut PoseBuffers::default())
 }
 
 /// [`pose`] into memory that a pose of before has left: at 100,000 Gaussians fresh memory costs as much as the work.
@@ -43,7 +43,7 @@ pub fn pose_into<'a>(
     strategy: &Strategy,
     buffers: &mut PoseBuffers,
 ) -> Result<Posed<'a>, StrategyError> {
-    pose_on(pulp::Arch::new(), bound, body, strategy, None, buffers)
+    pose_on(pulp::Arch::new(), bound, body, strategy, buffers)
 }
 
 /// [`pose_into`] for one camera: Gaussians that it surely does not see are moved, but neither turned nor coloured. The
@@ -59,7 +59,25 @@ pub fn pose_seen<'a>(
     camera: &Camera,
     buffers: &mut PoseBuffers,
 ) -> Result<Posed<'a>, StrategyError> {
-    pose_on(pulp::Arch::new(), bound, body, strategy, Some(camera), buffers)
+    let frame = Frame::new(pulp::Arch::new(), bound, body, strategy, None)?.seen_by(camera);
+    Ok(pose_frame(&frame, bound, buffers))
+}
+
+/// [`pose_into`] with the signs of a sequence: [`RotationChoice::LiftedSum`] reads `lift`, which is that of `body`, where
+/// [`pose`] takes the one from rest. Other strategies have no use for it.
+///
+/// # Errors
+/// As [`pose`], and [`StrategyError::Scene`] for a lift of another number of joints.
+pub fn pose_lifted<'a>(
+    bound: &'a BoundAvatar,
+    body: &PosedBody<'_>,
+    strategy: &Strategy,
+    lift: &JointLift,
+    buffers: &mut PoseBuffers,
+) -> Result<Posed<'a>, StrategyError> {
+    expect_count("joint quaternions", lift.quaternions().len(), body.joints.len())?;
+    let frame = Frame::new(pulp::Arch::new(), bound, body, strategy, Some(lift))?;
+    Ok(pose_frame(&frame, bound, buffers))
 }
 
 /// Memory of poses that are no longer needed: [`pose_into`] takes it, [`PoseBuffers::reclaim`] gives it back.
@@ -102,14 +120,14 @@ fn pose_on<'a>(
     bound: &'a BoundAvatar,
     body: &PosedBody<'_>,
     strategy: &Strategy,
-    camera: Option<&Camera>,
     buffers: &mut PoseBuffers,
 ) -> Result<Posed<'a>, StrategyError> {
-    let frame = Frame::new(arch, bound, body, strategy)?;
-    let frame = match camera {
-        Some(camera) => frame.seen_by(camera),
-        None => frame,
-    };
+    Ok(pose_frame(&Frame::new(arch, bound, body, strategy, None)?, bound, buffers))
+}
+
+/// Walks all blocks of a frame of `bound`.
+fn pose_frame<'a>(frame: &Frame<'_>, bound: &'a BoundAvatar, buffers: &mut PoseBuffers) -> Posed<'a> {
+    let strategy = frame.strategy;
     let produces = Produces::of(strategy, bound);
     let n = bound.len();
     let mut means = sized(&mut buffers.means, n, Vec3::ZERO);
@@ -126,9 +144,9 @@ fn pose_on<'a>(
     };
     let parts = outputs.split(bound.sh_count());
     parts.into_par_iter().enumerate().for_each(|(c, outputs)| {
-        PoseChunk { frame: &frame, start: c * CHUNK, outputs, turns: Vec::new() }.run(c);
+        PoseChunk { frame, start: c * CHUNK, outputs, turns: Vec::new() }.run(c);
     });
-    Ok(Posed {
+    Posed {
         means,
         factors,
         opacities: Cow::Borrowed(&bound.opacities),
@@ -137,7 +155,7 @@ fn pose_on<'a>(
         view_frames,
         colour_clamp: strategy.clamp.into(),
         rotations,
-    })
+    }
 }
 
 /// Which of the optional outputs a strategy produces. Colours of degree 0 look the same from everywhere.
@@ -342,15 +360,9 @@ mod tests {
         let at = Pose::from_axis_angles(&body.skeleton, &angles, DVec3::Z);
         let body = PosedBody::new(&body, &at).unwrap();
         for preset in PRESETS {
-            let narrow = pose_on(
-                pulp::Arch::Scalar,
-                &bound,
-                &body,
-                &preset.strategy,
-                None,
-                &mut PoseBuffers::default(),
-            )
-            .unwrap();
+            let narrow =
+                pose_on(pulp::Arch::Scalar, &bound, &body, &preset.strategy, &mut PoseBuffers::default())
+                    .unwrap();
             assert_eq!(narrow, pose(&bound, &body, &preset.strategy).unwrap(), "{}", preset.id);
 
             // The pose serves as its own derivative.

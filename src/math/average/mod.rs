@@ -190,13 +190,13 @@ impl<T: Real, S: Real> Bones<'_, T, S> {
         b
     }
 
-    /// Σ w q, each q in the hemisphere of the heaviest bone, normalised. Not zero: every term has a non-negative
-    /// inner product with the heaviest bone, and that bone's own is 1.
+    /// Σ w q, each q in the hemisphere of the heaviest bone, normalised. Not zero: no term has an inner product with the
+    /// heaviest bone that is less than 0 by more than rounding, and that bone's own is 1.
     fn nlerp(&self) -> Quaternion<T> {
         let reference = self.heaviest();
         let mut sum = [T::ZERO; 4];
         for (q, weight) in self.iter() {
-            let weight = if dot4(q, reference) < T::ZERO { -weight } else { weight };
+            let weight = if rotation::is_opposite(q, reference) { -weight } else { weight };
             for k in 0..4 {
                 sum[k] += weight * q[k];
             }

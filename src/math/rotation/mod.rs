@@ -55,6 +55,21 @@ pub fn normalize<T: Real>(q: Quaternion<T>) -> Option<Quaternion<T>> {
     Some(scaled.map(|c| c / length))
 }
 
+/// True if a unit quaternion is to be negated to lie in the hemisphere of a unit reference.
+///
+/// Where they are 180° apart as rotations (the inner product is within 16 ulp of 0) either sign is as good; the one is
+/// taken that makes the largest component of the half turn between them positive. So the choice does not depend on the
+/// sign that `q` came with, nor on rounding, and follows turns of the world.
+#[inline(always)]
+pub(crate) fn is_opposite<T: Real>(q: Quaternion<T>, reference: Quaternion<T>) -> bool {
+    let cosine = dot4(q, reference);
+    if cosine.abs() > T::from_f64(16.0) * T::EPSILON {
+        return cosine < T::ZERO;
+    }
+    let [_, x, y, z] = multiply(conjugate(reference), q);
+    [y, z].into_iter().fold(x, |largest, c| if c.abs() > largest.abs() { c } else { largest }) < T::ZERO
+}
+
 /// The angle of the rotation that takes `a` to `b`, radians in \[0, π\]; the quaternions need not have unit length and
 /// their signs do not matter. Accurate for tiny angles and near 180°: `4 atan2(|a ∓ b|, |a ± b|)` over unit vectors
 /// (Kahan) instead of an arc cosine. NaN if a quaternion is zero or not finite.

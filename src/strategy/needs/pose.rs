@@ -141,6 +141,7 @@ impl<'a> PoseBounds<'a> {
             | RotationChoice::FaceFrame(_)
             | RotationChoice::VertexAverage(_)
             | RotationChoice::VertexQuaternions(_)
+            | RotationChoice::LiftedSum
             | RotationChoice::DualQuaternion => f64::INFINITY,
         }
     }

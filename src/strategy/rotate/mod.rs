@@ -4,16 +4,18 @@ mod average;
 mod dual;
 mod faces;
 mod lbs;
+mod lifted;
 
 pub(super) use faces::{FaceTurns, VertexTurns};
 
 use super::blend::Blend;
 use super::joints::Joints;
 use super::layout::{Block, Chunk, LANES, Lanes};
-use super::{LbsProjection, RotationChoice};
+use super::{JointLift, LbsProjection, RotationChoice};
 use crate::math::average::Solver;
 use crate::math::{Quaternion, rotation};
 use average::splat;
+use std::borrow::Cow;
 
 /// How the Gaussians of a block turn.
 pub(super) struct Turn {
@@ -33,6 +35,8 @@ pub(super) enum Source<'a> {
     Lbs(LbsProjection),
     /// The joints' rotations.
     Average(Solver),
+    /// The joints' rotations with signs.
+    Lifted(Cow<'a, JointLift>),
     /// The joints' rigid motions.
     Dual,
     /// One rotation per face.
@@ -48,10 +52,14 @@ impl<'a> Source<'a> {
         joints: &Joints,
         body: &crate::scene::PosedBody<'_>,
         surface: Option<&'a super::seat::Surface>,
+        lift: Option<&'a JointLift>,
     ) -> Self {
         match (choice, surface) {
             (RotationChoice::Lbs(projection), _) => Self::Lbs(projection),
             (RotationChoice::QuaternionAverage(solver), _) => Self::Average(solver),
+            (RotationChoice::LiftedSum, _) => {
+                Self::Lifted(lift.map_or_else(|| Cow::Owned(JointLift::from_rest(body)), Cow::Borrowed))
+            }
             (RotationChoice::DualQuaternion, _) => Self::Dual,
             (RotationChoice::FaceFrame(kind), Some(surface)) => {
                 Self::Faces(FaceTurns::new(kind, body, surface))
@@ -114,6 +122,7 @@ pub(super) fn turn(arch: pulp::Arch, source: &Source<'_>, input: &BlockInput<'_>
         Source::Average(solver) => {
             average::average(arch, input.joints, indices, weights, input.blend, *solver)
         }
+        Source::Lifted(lift) => lifted::summed(lift.quaternions(), input),
         Source::Dual => {
             let motions = dual::blend(input.joints, indices, weights);
             means = Some(motions.transform(&input.block.means));

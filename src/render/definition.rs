@@ -1,9 +1,9 @@
-//! The definition of the 3DGS image, in f64, pixel by pixel and splat by splat, with nothing clever.
-#![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "shared by tests")]
+//! The definition of the 3DGS image, in `f64`, pixel by pixel and splat by splat, with nothing clever: what the renderer
+//! is held against, here and in its tests.
 
+use crate::render::splat::RenderSettings;
+use crate::scene::{Camera, ColourClamp, Posed};
 use glam::{DMat2, DMat3, DVec2, DVec3};
-use skinsplat::render::splat::RenderSettings;
-use skinsplat::scene::{Camera, ColourClamp, Posed};
 
 struct Splat {
     /// Of its Gaussian.
@@ -20,15 +20,20 @@ struct Splat {
 /// What a pixel shows besides Gaussians.
 #[derive(Clone, Copy)]
 pub struct Pane {
+    /// Linear order R, G, B.
     pub colour: DVec3,
+    /// Its alpha.
     pub coverage: f64,
+    /// Camera depth, metres: Gaussians at it or beyond lie behind.
     pub depth: f64,
 }
 
 /// The Gaussians that a pixel blends, front to back, and how many of them lie in front of its pane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parted {
+    /// Indices of Gaussians.
     pub chosen: Vec<usize>,
+    /// So many of them lie in front.
     pub front: usize,
 }
 
@@ -51,7 +56,7 @@ pub fn render_parted(
     std::iter::zip(pixels(camera), std::iter::zip(panes, parted))
         .map(|(pixel, (pane, Parted { chosen, front }))| {
             let of = |chosen: &[usize]| -> Vec<&Splat> {
-                chosen.iter().map(|&i| splats[i].as_ref().unwrap()).collect()
+                chosen.iter().filter_map(|&i| splats[i].as_ref()).collect()
             };
             let behind = blend(of(&chosen[*front..]).into_iter(), pixel, background);
             let through = |c: usize, own: f64| own * pane.coverage + behind[c] * (1.0 - pane.coverage);
@@ -94,7 +99,7 @@ pub fn render_chosen(
     let splats: Vec<Option<Splat>> = (0..posed.len()).map(|i| project(posed, i, camera, settings)).collect();
     let background = DVec3::from_array(settings.background.map(f64::from));
     std::iter::zip(pixels(camera), chosen)
-        .map(|(pixel, chosen)| blend(chosen.iter().map(|&i| splats[i].as_ref().unwrap()), pixel, background))
+        .map(|(pixel, chosen)| blend(chosen.iter().filter_map(|&i| splats[i].as_ref()), pixel, background))
         .collect()
 }
 

@@ -1,0 +1,80 @@
+//! `reproduce stress`: numerical stability at the extremes.
+
+use super::output::emit;
+use super::progress::Watch;
+use super::{Context, Exit};
+use crate::data::{atomic, frames};
+use crate::stress::{Report, Section};
+use anyhow::{Context as _, Result};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Try every strategy and solver on inputs that are hard on purpose, and say what holds, degrades and breaks.
+///
+/// Needs no data. Writes stress.md, stress.csv (a line per input), stress.json and pictures of what breaks visibly, and
+/// prints the Markdown.
+#[derive(Debug, clap::Args)]
+pub(super) struct Stress {
+    /// Folder to write to; it is made if it is missing
+    #[arg(long, value_name = "DIR", default_value = "runs/stress")]
+    out: PathBuf,
+    /// Only these sections
+    #[arg(long, value_name = "SECTION", value_delimiter = ',')]
+    only: Vec<SectionName>,
+    /// Fewer inputs
+    #[arg(long)]
+    quick: bool,
+}
+
+/// A section by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct SectionName(Section);
+
+impl std::str::FromStr for SectionName {
+    type Err = String;
+
+    fn from_str(id: &str) -> Result<Self, String> {
+        let known = || Section::ALL.map(Section::id).join(", ");
+        let section = Section::ALL.into_iter().find(|section| section.id() == id);
+        section.map(Self).ok_or_else(|| format!("expected one of {}", known()))
+    }
+}
+
+impl Stress {
+    pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        let out = &self.out;
+        std::fs::create_dir_all(out).with_context(|| format!("{}: cannot make the folder", out.display()))?;
+        let sections: Vec<Section> = Section::ALL.into_iter().filter(|s| self.wants(*s)).collect();
+        let watch = Watch::new(context.quiet);
+        watch.start("sections", sections.len());
+        let mut findings = Vec::new();
+        let mut pictures = Vec::new();
+        for section in sections {
+            let examined = section.examine(self.quick)?;
+            findings.push(examined.findings);
+            pictures.extend(examined.pictures);
+            watch.see(crate::run::Event::FrameDone);
+        }
+        drop(watch);
+        let report = Report::new(self.quick, findings, pictures);
+        for picture in &report.pictures {
+            frames::save_png(&out.join(&picture.file), &picture.image)?;
+        }
+        let markdown = report.markdown();
+        write(&out.join("stress.csv"), &report.csv()?)?;
+        write(&out.join("stress.json"), &report.json()?)?;
+        write(&out.join("stress.md"), &markdown)?;
+        if !context.quiet {
+            emit(&markdown)?;
+        }
+        Ok(Exit::Success)
+    }
+
+    fn wants(&self, section: Section) -> bool {
+        self.only.is_empty() || self.only.contains(&SectionName(section))
+    }
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    Ok(atomic::write(path, |file| file.write_all(text.as_bytes()))?)
+}

@@ -1,0 +1,86 @@
+//! Pictures of what breaks visibly: an arm whose second joint passes 180°, under one rotation choice each.
+
+use super::report::Picture;
+use super::stage;
+use crate::render::splat::{RenderSettings, render};
+use crate::scene::{Camera, Image, PosedBody, RestBody};
+use crate::strategy::{BoundAvatar, JointLift, PoseBuffers, RotationChoice, StrategyError, pose_lifted};
+use glam::DVec3;
+
+/// Degrees of the joint in the four panels.
+const ANGLES: [f64; 4] = [150.0, 179.0, 181.0, 210.0];
+
+/// Side of a panel, pixels.
+const SIDE: usize = 192;
+
+/// The rotation choices that are shown, and what to look for.
+const SHOWN: [(&str, &str); 8] = [
+    ("closed-form", "the exact average (Eq. 7): right before and after 180°, and half a turn apart there"),
+    ("lifted-sum", "the remedy, signs nearest to the frame before: nothing jumps"),
+    ("power-15", "15 power steps, the paper's engine path: not converged near 180°"),
+    ("nlerp", "the sum of quaternions on the side of the heaviest bone"),
+    ("gram-schmidt-columns", "Gram-Schmidt over columns: whole rings turned the wrong way"),
+    ("matrix-to-quaternion-raw", "the stock conversion, drawn as it is: splats swell and shrink"),
+    ("dual-quaternion", "dual quaternions: the volume stays, the jump too"),
+    ("face-splattingavatar", "the frame of the face, which linear blending folds to nothing"),
+];
+
+/// A strip of poses for a twist and for a bend, for every choice of [`SHOWN`].
+///
+/// # Errors
+/// None that the built-in body does not cause.
+pub(super) fn draw(quick: bool) -> Result<Vec<Picture>, StrategyError> {
+    let body = stage::body()?;
+    let bound = BoundAvatar::new(&stage::surface(&body), &body)?;
+    let mut pictures = Vec::new();
+    for (id, about) in SHOWN.iter().take(if quick { 2 } else { SHOWN.len() }) {
+        let Ok(rotation) = id.parse::<RotationChoice>() else { continue };
+        for (motion, axis) in [("twist", DVec3::X), ("bend", DVec3::Z)] {
+            pictures.push(Picture {
+                file: format!("{motion}-{id}.png"),
+                caption: format!(
+                    "{motion} by {}: {id}: {about}.",
+                    ANGLES.map(|a| format!("{a}°")).join(", ")
+                ),
+                image: strip(&body, &bound, rotation, axis)?,
+            });
+        }
+    }
+    Ok(pictures)
+}
+
+fn strip(
+    body: &RestBody,
+    bound: &BoundAvatar,
+    rotation: RotationChoice,
+    axis: DVec3,
+) -> Result<Image, StrategyError> {
+    let middle = stage::LENGTH / stage::BONES as f64;
+    let target = DVec3::X * middle;
+    let camera = Camera::look_at(
+        target + DVec3::new(0.0, 0.25, 0.6),
+        target,
+        DVec3::Y,
+        260.0,
+        SIDE as u32,
+        SIDE as u32,
+    );
+    let settings = RenderSettings { background: [1.0; 3], antialiased: false };
+    let strategy = stage::plain(rotation);
+    let mut strip = Image::filled(SIDE * ANGLES.len(), SIDE, [1.0; 3]);
+    let mut lift: Option<JointLift> = None;
+    for (panel, degrees) in ANGLES.into_iter().enumerate() {
+        let angle = axis * degrees.to_radians();
+        let at = stage::bent(body, &[DVec3::ZERO, angle, DVec3::ZERO, DVec3::ZERO]);
+        let posed_body = PosedBody::new(body, &at)?;
+        let next = JointLift::next(lift.as_ref(), &posed_body);
+        let posed = pose_lifted(bound, &posed_body, &strategy, &next, &mut PoseBuffers::default())?;
+        lift = Some(next);
+        let rendered = render(&posed, &camera, &settings);
+        let width = strip.width();
+        for (y, row) in rendered.image.pixels().chunks(SIDE).enumerate() {
+            strip.pixels_mut()[y * width + panel * SIDE..][..SIDE].copy_from_slice(row);
+        }
+    }
+    Ok(strip)
+}
