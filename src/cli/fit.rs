@@ -6,11 +6,7 @@ use super::progress::Watch;
 use super::{Context, Exit};
 use crate::data::{Sequence, Subject};
 use crate::experiment::{FitOptions, Profile, Recipe, evenly_spaced};
-use crate::fit::train::Fitted;
-use crate::run::Error;
-use crate::run::fitting::{self, FitEvent, FitFiles, FitReport, HeldOut};
-use crate::run::held_out::held_out;
-use crate::strategy::Strategy;
+use crate::run::fitting::{self, FitEvent, FitFiles, FitReport, HeldOut, Tests};
 use anyhow::{Context as _, Result, bail};
 use std::path::PathBuf;
 
@@ -40,7 +36,7 @@ pub(super) struct Fit {
     /// How much of the data to look at, and for how long: quick, standard or paper
     #[arg(long, value_name = "P", default_value = "standard", value_parser = super::planning::profile)]
     profile: Profile,
-    /// Also score the test frames each time so many iterations are done
+    /// Also score the test frames at the start and each time so many iterations are done
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     test_every: Option<u32>,
     /// How the result is printed
@@ -63,7 +59,6 @@ impl Fit {
             bail!("--out {}: expected a name that ends in .ply", self.out.display());
         }
         let recipe = Recipe::parse(&self.recipe)?;
-        let strategy: Strategy = recipe.strategy.parse()?;
         let (dataset, subject) = self.data.subject(&self.subject)?;
         let (training, tests) = self.sequences(&subject)?;
         let own = recipe.iterations;
@@ -80,27 +75,15 @@ impl Fit {
             context.note(format!("{}: replaced when the fit is done", self.out.display()));
         }
         let watch = Watch::new(context.quiet);
-        let mut scores: Vec<HeldOut> = Vec::new();
-        let mut report = fitting::fit(&training, &options, &trained_on, &files, &mut |event| {
+        let tests = Tests { sequences: &tests, every: self.test_every };
+        let report = fitting::fit(&training, &options, &trained_on, &files, tests, &mut |event| {
             match event {
                 FitEvent::Starting => watch.start("start", 1),
                 FitEvent::Warning(text) => watch.above(&format!("warning: {text}"), context.quiet),
-                FitEvent::Step(step, fitted) => {
-                    watch.fitting(step);
-                    let done = step.iteration;
-                    if done < step.iterations && self.test_every.is_some_and(|every| done % every == 0) {
-                        scores.extend(score(&tests, fitted, strategy, done)?);
-                    }
-                }
+                FitEvent::Step(step) => watch.fitting(step),
             }
             Ok(())
         })?;
-        let avatar = crate::data::ply::read_avatar(&self.out)?;
-        let mesh = options.recipe.mesh.as_ref().map(|_| files.mesh().read(&training.body)).transpose()?;
-        let fitted = Fitted { avatar: &avatar, mesh: mesh.as_ref() };
-        scores.extend(score(&tests, fitted, strategy, options.iterations)?);
-        report.held_out = scores;
-        fitting::write_report(&files.sidecar(), &report)?;
         drop(watch);
         self.print(&report)?;
         Ok(Exit::Success)
@@ -149,14 +132,4 @@ impl Fit {
         }
         emit(&text)
     }
-}
-
-/// The scores of an avatar on all test sequences.
-fn score(
-    tests: &[Sequence],
-    fitted: Fitted<'_>,
-    strategy: Strategy,
-    iteration: u32,
-) -> Result<Vec<HeldOut>, Error> {
-    tests.iter().map(|sequence| held_out(fitted, &strategy, sequence, iteration)).collect()
 }

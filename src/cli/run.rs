@@ -20,10 +20,10 @@ pub(super) const DEFAULT_OUT: &str = "runs/default";
 
 /// Evaluate: make avatars, pose, render, score, and write the tables.
 ///
-/// Writes tables.md, one .csv and .tex per table, results.json (see reports/SCHEMA.md), curves.csv (how the fits went) and
-/// run.json (who, when, how fast). frames.jsonl remembers every frame by its content: a run that is killed goes on where it stopped, and a run with
-/// other settings redoes only what they change. Slices (--shard) write results of their own; when all are done, run again
-/// without --shard to collect them.
+/// Writes tables.md, one .csv and .tex per table, results.json (see reports/SCHEMA.md), curves.csv and curves/ (how the fits
+/// went) and run.json (who, when, how fast). frames.jsonl remembers every frame by its content: a run that is killed goes on
+/// where it stopped, and a run with other settings redoes only what they change. Slices (--shard) write results of their own;
+/// when all are done, run again without --shard to collect them.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Run {
@@ -88,9 +88,7 @@ impl Run {
         let records: Records = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
         let results = report::results(&planned.plan, &planned.experiments, &records)?;
         write_results(&self.out, &results)?;
-        if let Some(text) = run::curves::csv(&planned.plan, &self.out.join(AVATARS))? {
-            write_text(&self.out.join("curves.csv"), &text)?;
-        }
+        self.write_curves(planned)?;
         write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
         if self.images {
             self.write_images(planned, &records, context)?;
@@ -112,6 +110,21 @@ impl Run {
 }
 
 impl Run {
+    /// How the fits went, if there were any.
+    fn write_curves(&self, Planned { plan, experiments, .. }: &Planned) -> Result<()> {
+        let curves = run::curves::curves(plan, &self.out.join(AVATARS))?;
+        if curves.is_empty() {
+            return Ok(());
+        }
+        write_text(&self.out.join("curves.csv"), &report::curves_csv(&curves))?;
+        let folder = self.out.join("curves");
+        make_folder(&folder)?;
+        for (name, svg) in report::curve_plots(&curves, experiments)? {
+            write_text(&folder.join(format!("{name}.svg")), &svg)?;
+        }
+        Ok(())
+    }
+
     fn write_images(
         &self,
         Planned { plan, library, .. }: &Planned,

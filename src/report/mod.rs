@@ -15,6 +15,7 @@ mod captions;
 mod collect;
 pub mod compare;
 mod csv;
+mod curves;
 mod latex;
 mod layout;
 mod markdown;
@@ -28,6 +29,7 @@ mod table;
 
 pub use collect::results;
 pub use csv::csv;
+pub use curves::{curve_plots, curves_csv};
 pub use latex::latex;
 pub use markdown::markdown;
 pub use page::page;

@@ -1,13 +1,14 @@
 //! Avatars that jobs need: built from training frames once, kept in the run's folder, read back bit for bit.
 
-use super::fitting::{self, FitEvent, FitFiles};
+use super::fitting::{self, FitEvent, FitFiles, Tests};
 use super::textured::TexturedFiles;
 use super::{Error, Event, Library};
 use crate::data::{Sequence, ply};
-use crate::experiment::{AvatarBuild, AvatarRecipe, PlannedFit};
+use crate::experiment::{AvatarBuild, AvatarRecipe, Job, Plan, PlannedFit, evenly_spaced};
 use crate::fit::surface::{BindTo, Placement, SurfaceInit, surface_init};
 use crate::fit::texture::{TextureInit, TexturedBody, gather_texture};
 use crate::strategy::BoundAvatar;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// An avatar that is ready to be posed.
@@ -27,6 +28,7 @@ pub enum Prepared {
 /// # Errors
 /// Training frames that cannot be read or used, or a folder that cannot be written.
 pub fn prepare(
+    plan: &Plan,
     build: &AvatarBuild,
     library: &Library,
     folder: &Path,
@@ -40,7 +42,8 @@ pub fn prepare(
     if let Some(planned) = &build.fit
         && !file.is_file()
     {
-        fit(build, planned, &sequence, file.clone(), folder, watch)?;
+        let tests = tests(plan, build, library)?;
+        fit(build, planned, &sequence, &tests, file.clone(), folder, watch)?;
     }
     if !file.is_file() {
         let avatar = surface_init(&sequence, &surface_options(build))?;
@@ -61,6 +64,7 @@ fn fit(
     build: &AvatarBuild,
     planned: &PlannedFit,
     sequence: &Sequence,
+    tests: &[Sequence],
     file: PathBuf,
     folder: &Path,
     watch: &(dyn Fn(Event) + Sync),
@@ -68,13 +72,35 @@ fn fit(
     let start = Some(folder.join(format!("{}.ply", planned.start)));
     let files = FitFiles { avatar: file, start };
     let name = format!("{}/{}/{}", build.dataset, build.subject, sequence.id);
-    fitting::fit(sequence, &planned.options, &name, &files, &mut |event| {
-        if let FitEvent::Step(step, _) = event {
+    let every = planned.options.iterations.div_ceil(CURVE_POINTS);
+    let tests = Tests { sequences: tests, every: Some(every) };
+    fitting::fit(sequence, &planned.options, &name, &files, tests, &mut |event| {
+        if let FitEvent::Step(step) = event {
             watch(Event::Fitting(step));
         }
         Ok(())
     })?;
     Ok(())
+}
+
+/// Points of the curve of test scores, after the start.
+const CURVE_POINTS: u32 = 8;
+/// Frames per sequence behind a point: a curve needs fewer than a table.
+const CURVE_FRAMES: usize = 4;
+
+/// Some of the frames on which the plan scores what is drawn with an avatar.
+fn tests(plan: &Plan, build: &AvatarBuild, library: &Library) -> Result<Vec<Sequence>, Error> {
+    let draws = |job: &&Job| job.variants.iter().any(|variant| variant.avatar == build.key);
+    let mut scored: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
+    for job in plan.jobs.iter().filter(draws) {
+        scored.entry(&job.sequence).or_default().insert(job.frame);
+    }
+    let few = |(id, frames): (&str, BTreeSet<usize>)| {
+        let frames = evenly_spaced(&frames.into_iter().collect::<Vec<_>>(), Some(CURVE_FRAMES));
+        let sequence = library.sequence(&build.dataset, &build.subject, id)?.selected(&frames)?;
+        Ok(build.resolution.map_or(sequence.clone(), |side| sequence.reduced(side)))
+    };
+    scored.into_iter().map(few).collect()
 }
 
 /// The frames that an avatar is made from.

@@ -1,55 +1,86 @@
-//! The way of every fit of a run, as one CSV: a line per variant, subject and point of the curve.
+//! How the fits of a run went: loss and PSNR on training frames, PSNR on held-out frames on the way.
 
 use super::Error;
 use super::fitting::FitReport;
 use crate::experiment::Plan;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+/// The way of one fit, as one variant of a table draws it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// Id of the experiment.
+    pub experiment: String,
+    /// Data set.
+    pub dataset: String,
+    /// Subject.
+    pub subject: String,
+    /// Id of the variant.
+    pub variant: String,
+    /// By iteration, ascending.
+    pub points: Vec<CurvePoint>,
+}
+
+/// A point of a curve. Not everything is known everywhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CurvePoint {
+    /// Iterations done.
+    pub iteration: u32,
+    /// Mean loss since the last point, regularisers included.
+    pub loss: Option<f64>,
+    /// Mean PSNR of training frames since the last point, dB.
+    pub training_psnr: Option<f64>,
+    /// Number of Gaussians.
+    pub splats: Option<usize>,
+    /// Mean PSNR over a few frames of each test sequence (mean over sequences, each counting once), dB, by the default
+    /// protocol.
+    pub test_psnr: Option<f64>,
+}
+
 /// The curves of the fits that a plan names, from the sidecars in the run's folder of avatars. Fits that are not there yet
-/// are left out; `None` if none is there.
+/// are left out.
 ///
 /// # Errors
 /// A sidecar that is no sidecar.
-pub fn csv(plan: &Plan, folder: &Path) -> Result<Option<String>, Error> {
-    let mut lines = csv::Writer::from_writer(Vec::new());
-    let mut any = false;
+pub fn curves(plan: &Plan, folder: &Path) -> Result<Vec<Curve>, Error> {
+    let mut curves = Vec::new();
     let mut seen = BTreeSet::new();
     for job in &plan.jobs {
-        let table = &plan.tables[job.table].experiment;
+        let experiment = &plan.tables[job.table].experiment;
         for variant in &job.variants {
-            if !seen.insert((table, &job.dataset, &job.subject, &variant.id)) {
+            if !seen.insert((experiment, &job.dataset, &job.subject, &variant.id)) {
                 continue;
             }
             let path = folder.join(format!("{}.json", variant.avatar));
             let Ok(text) = std::fs::read_to_string(&path) else { continue };
             let report: FitReport = serde_json::from_str(&text)
                 .map_err(|error| Error::Checkpoint { path, problem: error.to_string() })?;
-            if !any {
-                write(&mut lines, HEADINGS.map(str::to_owned));
-                any = true;
-            }
-            for step in &report.curve {
-                let names = [table, &job.dataset, &job.subject, &variant.id].map(Clone::clone);
-                let numbers = [
-                    step.iteration.to_string(),
-                    format!("{:.6}", step.loss),
-                    format!("{:.3}", step.psnr),
-                    step.splats.to_string(),
-                ];
-                let [a, b, c, d] = names;
-                let [e, f, g, h] = numbers;
-                write(&mut lines, [a, b, c, d, e, f, g, h]);
-            }
+            curves.push(Curve {
+                experiment: experiment.clone(),
+                dataset: job.dataset.clone(),
+                subject: job.subject.clone(),
+                variant: variant.id.clone(),
+                points: points(&report),
+            });
         }
     }
-    let bytes = lines.into_inner().expect("writing to memory cannot fail");
-    Ok(any.then(|| String::from_utf8(bytes).expect("text in, text out")))
+    Ok(curves)
 }
 
-const HEADINGS: [&str; 8] =
-    ["experiment", "dataset", "subject", "variant", "iteration", "loss", "training_psnr", "splats"];
-
-fn write(lines: &mut csv::Writer<Vec<u8>>, record: [String; 8]) {
-    lines.write_record(record).expect("writing to memory cannot fail");
+fn points(report: &FitReport) -> Vec<CurvePoint> {
+    let mut points: BTreeMap<u32, CurvePoint> = BTreeMap::new();
+    for step in &report.curve {
+        points.entry(step.iteration).or_default().loss = Some(step.loss);
+        let point = points.entry(step.iteration).or_default();
+        (point.training_psnr, point.splats) = (Some(step.psnr), Some(step.splats));
+    }
+    let mut tests: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+    for score in &report.held_out {
+        tests.entry(score.iteration).or_default().push(score.psnr);
+    }
+    for (iteration, scores) in tests {
+        let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+        points.entry(iteration).or_default().test_psnr = Some(mean);
+    }
+    points.into_iter().map(|(iteration, point)| CurvePoint { iteration, ..point }).collect()
 }

@@ -81,7 +81,7 @@ pub(super) fn prepare_avatars(
     for build in builds {
         avatars.insert(
             build.key.clone(),
-            prepare(build, library, folder, watch).map_err(|error| error.to_string()),
+            prepare(plan, build, library, folder, watch).map_err(|error| error.to_string()),
         );
         watch(Event::AvatarReady);
     }

@@ -2,6 +2,7 @@
 //! was made.
 
 use super::Error;
+use super::held_out::held_out;
 use super::textured::TexturedFiles;
 use crate::data::{Sequence, atomic, ply};
 use crate::experiment::{CodeVersions, FitOptions};
@@ -65,8 +66,7 @@ pub struct FitReport {
     pub splats: usize,
     /// About a hundred points of the way, each the mean over the iterations since the last one.
     pub curve: Vec<Step>,
-    /// Held-out scores, where they were asked for.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Scores on frames that the fit did not see, in the order of iterations.
     pub held_out: Vec<HeldOut>,
     /// What was wrong with the data, but not fatally.
     pub warnings: Vec<String>,
@@ -87,17 +87,37 @@ pub struct HeldOut {
     pub frames: usize,
 }
 
+/// Which frames say on the way how an avatar does where it was not fitted.
+#[derive(Clone, Copy, Debug)]
+pub struct Tests<'a> {
+    /// What is scored.
+    pub sequences: &'a [Sequence],
+    /// Scored each time so many iterations are done, and at the start; at the end in any case.
+    pub every: Option<u32>,
+}
+
+impl Tests<'_> {
+    fn are_due(&self, done: u32, iterations: u32) -> bool {
+        done < iterations && self.every.is_some_and(|every| done.is_multiple_of(every))
+    }
+
+    fn score(&self, fitted: Fitted<'_>, options: &FitOptions, done: u32) -> Result<Vec<HeldOut>, Error> {
+        let strategy = options.recipe.strategy.parse()?;
+        self.sequences.iter().map(|sequence| held_out(fitted, &strategy, sequence, done)).collect()
+    }
+}
+
 /// What is said while a fit goes on.
 pub enum FitEvent<'a> {
     /// The avatar with which it starts is being made.
     Starting,
-    /// An iteration is done; the avatar as it stands.
-    Step(Step, Fitted<'a>),
+    /// An iteration is done.
+    Step(Step),
     /// Something is wrong with the data, but not fatally.
     Warning(&'a str),
 }
 
-/// Fits an avatar and writes it, unless it is there. The file's bits do not depend on how often the fit was interrupted.
+/// Fits an avatar and writes it, with its sidecar. Their bits do not depend on how often the fit was interrupted.
 ///
 /// # Errors
 /// Training frames that cannot be used, a fit that diverges (the last checkpoint stays), files that cannot be written.
@@ -107,6 +127,7 @@ pub fn fit(
     options: &FitOptions,
     trained_on: &str,
     files: &FitFiles,
+    tests: Tests<'_>,
     watch: &mut dyn FnMut(FitEvent<'_>) -> Result<(), Error>,
 ) -> Result<FitReport, Error> {
     let path = files.checkpoint();
@@ -115,7 +136,11 @@ pub fn fit(
         Some(checkpoint) => Trainer::resume(sequence, options, checkpoint)?,
         None => {
             watch(FitEvent::Starting)?;
-            Trainer::new(sequence, options, start(sequence, options, files)?)?
+            let trainer = Trainer::new(sequence, options, start(sequence, options, files)?)?;
+            if tests.are_due(0, options.iterations) {
+                progress.held_out = tests.score(trainer.fitted(), options, 0)?;
+            }
+            trainer
         }
     };
     let mut saved = Instant::now();
@@ -126,12 +151,19 @@ pub fn fit(
             progress.note_warning(warning);
         }
         progress.note(step);
-        watch(FitEvent::Step(step, trainer.fitted()))?;
+        watch(FitEvent::Step(step))?;
+        if tests.are_due(step.iteration, options.iterations) {
+            progress.held_out.extend(tests.score(trainer.fitted(), options, step.iteration)?);
+        }
         if trainer.is_resting() && saved.elapsed() > BETWEEN_CHECKPOINTS {
             progress.save(&path, trainer.checkpoint())?;
             saved = Instant::now();
         }
     }
+    if let Some(mesh) = trainer.fitted().mesh {
+        files.mesh().write(mesh)?;
+    }
+    progress.held_out.extend(score_end(&trainer, files, sequence, options, tests)?);
     let report = FitReport {
         schema: SCHEMA,
         code: CodeVersions::CURRENT,
@@ -140,13 +172,10 @@ pub fn fit(
         options: options.clone(),
         splats: trainer.avatar().gaussians.len(),
         curve: progress.curve,
-        held_out: Vec::new(),
+        held_out: progress.held_out,
         warnings: progress.warnings,
     };
     write_report(&files.sidecar(), &report)?;
-    if let Some(mesh) = trainer.fitted().mesh {
-        files.mesh().write(mesh)?;
-    }
     let metadata = ply::Metadata::default();
     ply::write_avatar(&files.avatar, trainer.avatar(), &metadata, ply::Encoding::LittleEndian)?;
     if path.is_file() {
@@ -155,11 +184,20 @@ pub fn fit(
     Ok(report)
 }
 
-/// Writes a sidecar.
-///
-/// # Errors
-/// A file that cannot be written.
-pub fn write_report(path: &Path, report: &FitReport) -> Result<(), Error> {
+/// Scores the avatar as its files have it: a texture's colours were rounded.
+fn score_end(
+    trainer: &Trainer<'_>,
+    files: &FitFiles,
+    sequence: &Sequence,
+    options: &FitOptions,
+    tests: Tests<'_>,
+) -> Result<Vec<HeldOut>, Error> {
+    let mesh = trainer.fitted().mesh.map(|_| files.mesh().read(&sequence.body)).transpose()?;
+    let fitted = Fitted { avatar: trainer.avatar(), mesh: mesh.as_ref() };
+    tests.score(fitted, options, options.iterations)
+}
+
+fn write_report(path: &Path, report: &FitReport) -> Result<(), Error> {
     let text = serde_json::to_string_pretty(report).expect("a report serialises") + "\n";
     Ok(atomic::write(path, |w| w.write_all(text.as_bytes()))?)
 }
@@ -181,6 +219,7 @@ struct Progress {
     curve: Vec<Step>,
     /// Sums of loss and PSNR since the last point of the curve, and their number.
     since: (f64, f64, u32),
+    held_out: Vec<HeldOut>,
     warnings: Vec<String>,
 }
 
