@@ -34,7 +34,7 @@ fn a_fit_leaves_an_avatar_that_poses_and_says_how_it_was_made() {
     assert_eq!(sidecar["curve"].as_array().unwrap().len(), 4);
     let at: Vec<u64> =
         sidecar["held_out"].as_array().unwrap().iter().map(|h| h["iteration"].as_u64().unwrap()).collect();
-    assert_eq!(at, [2, 2, 4, 4], "two test sequences, in the middle and at the end");
+    assert_eq!(at, [0, 0, 2, 2, 4, 4], "two test sequences, at the start, in the middle and at the end");
     let held: Vec<String> = desk.contents().iter().map(|(p, _)| p.display().to_string()).collect();
     assert!(held.iter().all(|name| !name.ends_with("checkpoint")), "{held:?}");
     assert!(desk.ok(args!["inspect", "ava.ply"]).contains("joint"));
