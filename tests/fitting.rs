@@ -6,7 +6,9 @@ use skinsplat::data::registry::Registry;
 use skinsplat::data::{FrameGenerator, FrameRef, FrameSource, Sequence, Subject, Truth};
 use skinsplat::experiment::{FitOptions, RECIPES, Recipe};
 use skinsplat::fit::Error;
+use skinsplat::fit::texture::SAMPLES;
 use skinsplat::fit::train::{Trainer, start};
+use skinsplat::render::mesh::SamplePattern;
 use skinsplat::run::held_out::held_out;
 use skinsplat::scene::{Avatar, Binding, Image, Mask};
 use std::sync::Arc;
@@ -45,9 +47,13 @@ fn every_recipe_improves_on_its_start_on_held_out_poses() {
         let options = options(&recipe.id, 60);
         let strategy = recipe.strategy.parse().unwrap();
         let first = start(&training, &options).unwrap();
-        let before = held_out(&first, &strategy, &test, 0).unwrap();
-        let avatar = fitted(&training, &options);
-        let after = held_out(&avatar, &strategy, &test, 60).unwrap();
+        let mut trainer = Trainer::new(&training, &options, first.clone()).unwrap();
+        let before = held_out(trainer.fitted(), &strategy, &test, 0).unwrap();
+        while !trainer.is_done() {
+            trainer.step().unwrap();
+        }
+        let avatar = trainer.avatar();
+        let after = held_out(trainer.fitted(), &strategy, &test, 60).unwrap();
         assert!(after.psnr > before.psnr + 0.5, "{}: {} dB to {} dB", recipe.id, before.psnr, after.psnr);
         assert_eq!(avatar.gaussians.sh_degree, usize::from(recipe.sh_degree), "{}", recipe.id);
         let fixed = recipe.densify.is_none();
@@ -59,10 +65,14 @@ fn every_recipe_improves_on_its_start_on_held_out_poses() {
 #[test]
 fn an_interrupted_fit_ends_in_the_same_bits_on_any_number_of_threads() {
     let training = small(&subject().train[0], 4);
-    for recipe in ["hugs-original", "splattingavatar-skinned", "ihuman-original"] {
+    for recipe in ["hugs-original", "splattingavatar-skinned", "ihuman-original", "haha"] {
         let options = options(recipe, 56);
         let first = start(&training, &options).unwrap();
-        let whole = fitted(&training, &options);
+        let mut trainer = Trainer::new(&training, &options, first.clone()).unwrap();
+        while !trainer.is_done() {
+            trainer.step().unwrap();
+        }
+        let (whole, mesh) = (trainer.avatar().clone(), trainer.fitted().mesh.cloned());
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let resumed = pool.install(|| {
             let mut trainer = Trainer::new(&training, &options, first.clone()).unwrap();
@@ -76,11 +86,37 @@ fn an_interrupted_fit_ends_in_the_same_bits_on_any_number_of_threads() {
             while !trainer.is_done() {
                 trainer.step().unwrap();
             }
-            trainer.avatar().clone()
+            (trainer.avatar().clone(), trainer.fitted().mesh.cloned())
         });
-        assert_eq!(whole, resumed, "{recipe}");
+        assert_eq!(mesh.is_some(), options.recipe.mesh.is_some());
+        assert!((&whole, &mesh) == (&resumed.0, &resumed.1), "{recipe}");
         assert_ne!(whole, first);
     }
+}
+
+/// Where the mesh shows the truth, Gaussians have no use and are removed.
+#[test]
+fn gaussians_of_a_hybrid_stay_where_the_mesh_falls_short() {
+    let training = small(&subject().train[0], 3);
+    let options = options("haha", 150);
+    let first = start(&training, &options).unwrap();
+    let survivors = |sequence: &Sequence| {
+        let mut trainer = Trainer::new(sequence, &options, first.clone()).unwrap();
+        while !trainer.is_done() {
+            trainer.step().unwrap();
+        }
+        trainer.avatar().gaussians.len()
+    };
+    let trainer = Trainer::new(&training, &options, first.clone()).unwrap();
+    let mesh = trainer.fitted().mesh.unwrap();
+    let shown_by_the_mesh = broken(&training, |i, truth| {
+        let frame = &training.frames[i];
+        let (pose, camera) = (&training.poses[frame.pose], &training.cameras[frame.camera]);
+        let drawing = mesh.drawing(pose, camera, SamplePattern::new(SAMPLES)).unwrap();
+        (truth.rgb, truth.alpha) = (drawing.colour, drawing.coverage);
+    });
+    let (few, more) = (survivors(&shown_by_the_mesh), survivors(&training));
+    assert!(2 * few < more && more < first.gaussians.len(), "{few}, {more} of {}", first.gaussians.len());
 }
 
 #[test]

@@ -44,6 +44,35 @@ fn a_fit_leaves_an_avatar_that_poses_and_says_how_it_was_made() {
 }
 
 #[test]
+fn a_hybrid_leaves_its_mesh_beside_its_gaussians() {
+    let desk = Desk::new();
+    let recipe = "haha+mesh.texture=64";
+    let fit = args![
+        "fit",
+        "snapshot_ava",
+        "--recipe",
+        recipe,
+        "--profile",
+        "quick",
+        "--iterations",
+        "3",
+        "--test-every",
+        "2",
+        "--out",
+        "ava.ply",
+        "--format",
+        "json",
+    ];
+    let sidecar: Value = serde_json::from_str(&desk.ok(fit.clone())).unwrap();
+    assert_eq!(sidecar["options"]["recipe"]["mesh"]["texture"], 64);
+    assert_eq!(sidecar["held_out"].as_array().unwrap().len(), 4);
+    let parts = ["ava.ply", "ava.texture.png", "ava.vertices.npy", "ava.json"];
+    let first = parts.map(|name| desk.bytes(name));
+    desk.ok([args!["--threads", "1"], fit].concat());
+    assert!(first == parts.map(|name| desk.bytes(name)), "the same bits on one thread");
+}
+
+#[test]
 fn what_cannot_be_fitted_is_refused_in_one_line_and_leaves_nothing() {
     let desk = Desk::new();
     for (arguments, reason) in [

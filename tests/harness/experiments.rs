@@ -130,7 +130,7 @@ fn the_tables_ask_what_the_paper_asks() {
             vec![Some("splattingavatar-original"), Some(per_vertex), Some(per_vertex)],
             vec![Some("animatable-original"), Some("quaternion-average")],
             vec![Some("animatable-original"), Some("quaternion-average")],
-            vec![None, Some("quaternion-average")],
+            vec![Some("face-tbn+rotation=face-haha-scaled"), None, Some("quaternion-average")],
         ]
     );
     let captures: Vec<Capture> =
@@ -143,7 +143,9 @@ fn the_tables_ask_what_the_paper_asks() {
         assert_eq!(metrics, expected, "{}", experiment.id);
         assert_eq!(experiment.layout == Layout::Wide, experiment.id == "table6");
     }
-    let mesh = &experiments[5].variants[0];
+    let [hybrid, mesh, _] = &experiments[5].variants[..] else { panic!("three variants") };
+    assert!(matches!(&hybrid.avatar, AvatarRecipe::Fit { name, .. } if name == "haha"));
+    assert_eq!(hybrid.paper.as_deref(), Some("original"));
     assert!(matches!(mesh.avatar, AvatarRecipe::TexturedMesh { .. }) && mesh.paper.is_none());
     assert_eq!(mesh.label, "Textured mesh");
     assert!(paper(&experiments[2]).row("male-4", "original").unwrap().doubt.is_some());

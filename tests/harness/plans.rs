@@ -87,6 +87,7 @@ fn avatars_are_shared_by_tables_that_make_the_same_ones() {
             ("multi", "animatable-skinned"),
             ("mono", "animatable-original"),
             ("mono", "animatable-skinned"),
+            ("hands", "haha"),
             ("hands", "mesh"),
             ("hands", "pure-skinned"),
         ]
@@ -95,8 +96,8 @@ fn avatars_are_shared_by_tables_that_make_the_same_ones() {
         plan.avatars.iter().filter_map(|avatar| Some(avatar.fit.as_ref()?.start.as_str())).collect();
     assert_eq!(
         starts.len(),
-        4,
-        "on mono's vertices and faces, on multi's vertices, on hands' fitted surface"
+        5,
+        "on mono's vertices and faces, on multi's vertices, on hands' faces and fitted surface"
     );
     let swap = planned(&Experiment::embedded_all()[1..2], &[figures()]);
     assert_eq!(swap.avatars.len(), 5 * 3 * 3, "five fits of three subjects with three seeds");
