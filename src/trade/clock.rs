@@ -17,11 +17,15 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// The quartiles of some times, at least one.
+    /// The quartiles of some times, at least one; linear between neighbours.
     pub fn of(times: &[f64]) -> Self {
         let mut sorted = times.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let at = |p: f64| sorted[((sorted.len() - 1) as f64 * p).round() as usize];
+        let at = |p: f64| {
+            let place = (sorted.len() - 1) as f64 * p;
+            let (below, above) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
+            below + (above - below) * place.fract()
+        };
         Self { median: at(0.5), low: at(0.25), high: at(0.75), repeats: sorted.len() }
     }
 
@@ -62,6 +66,7 @@ mod tests {
         assert_eq!((spread.low, spread.median, spread.high, spread.repeats), (2.0, 3.0, 4.0, 5));
         assert_eq!(spread.per(2).high, 2.0);
         assert_eq!(Spread::of(&[7.0]).median, 7.0);
+        assert_eq!(Spread::of(&[1.0, 3.0]).low, 1.5);
     }
 
     #[test]

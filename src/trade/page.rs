@@ -10,7 +10,7 @@ pub fn markdown(trade: &Trade, pictures: &[(String, String, String)]) -> String 
     for line in &trade.ran_on {
         let _ = writeln!(text, "- {}.", escape(line));
     }
-    text += "\nFront: no other row of the same motion is at least as good in time and error and better in one. Errors below \
+    text += "\nFront: no other row of the same motion is at least as good in time, in 95 % and in all of the errors (or in PSNR), and better in one. Errors below \
              1e-5° and images beyond 120 dB count as equal. Nothing but times, fronts and recommendations depends on the \
              machine.\n";
     for section in &trade.sections {

@@ -1,33 +1,39 @@
 //! The plot of a sweep.
 
-use super::Sweep;
+use super::section::{EQUAL_BELOW, EQUAL_BEYOND};
+use super::{Sweep, pareto_front};
 use crate::report::plot::{Point, Scatter};
 
-/// Cost against error of the rows of one motion, with the front; none if nothing was measured. Angles are the worst ones;
-/// images are drawn by their root mean square error, 1 being white against black.
+/// Cost against error of the rows of one motion; none if nothing was measured. Angles are those that 95 % of the Gaussians
+/// keep within; images are drawn by their root mean square error, 1 being white against black. The front is that of what
+/// is drawn.
 pub fn scatter(sweep: &Sweep, motion: &str) -> Option<Scatter> {
-    let mut by_angle = false;
-    let mut points = Vec::new();
-    for (row, on_front) in sweep.rows.iter().zip(sweep.front()) {
-        let (Ok(outcome), Some([x, _])) = (&row.outcome, sweep.cost_and_error(row)) else { continue };
-        if row.motion != motion {
-            continue;
-        }
-        let y = match (outcome.degrees, outcome.fidelity) {
-            (Some(degrees), _) => {
-                by_angle = true;
-                degrees.max
-            }
-            (None, Some(fidelity)) => 10.0_f64.powf(-fidelity.decibels() / 20.0),
-            (None, None) => continue,
-        };
-        points.push(Point { label: row.name(), x, y, on_front });
-    }
+    let rows = sweep.rows.iter().filter(|row| row.motion == motion);
+    let measured: Vec<_> =
+        rows.filter_map(|row| Some((row, sweep.cost(row)?, row.outcome.as_ref().ok()?))).collect();
+    let by_angle = measured.iter().any(|(.., outcome)| outcome.degrees.is_some());
+    let mut points: Vec<Point> = measured
+        .into_iter()
+        .filter_map(|(row, x, outcome)| {
+            let y = if by_angle {
+                outcome.degrees?.p95.max(EQUAL_BELOW)
+            } else {
+                10.0_f64.powf(-outcome.fidelity?.decibels().min(EQUAL_BEYOND) / 20.0)
+            };
+            Some(Point { label: row.name(), x, y, on_front: false })
+        })
+        .collect();
+    let front = pareto_front(&points.iter().map(|p| [p.x, p.y]).collect::<Vec<_>>());
+    points.iter_mut().zip(front).for_each(|(point, on_front)| point.on_front = on_front);
     (!points.is_empty()).then(|| Scatter {
         title: format!("{}, {motion} motion", sweep.title),
         x_label: if sweep.by_bytes { "bytes per Gaussian" } else { sweep.unit.title() }.to_owned(),
-        y_label: if by_angle { "worst error, degrees" } else { "root mean square error of images" }
-            .to_owned(),
+        y_label: if by_angle {
+            "95 % of errors are below, degrees"
+        } else {
+            "root mean square error of images"
+        }
+        .to_owned(),
         points,
     })
 }

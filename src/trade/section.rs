@@ -4,9 +4,9 @@ use super::{Degrees, Fidelity, Spread, pareto_front};
 use serde::Serialize;
 
 /// Errors below this, degrees, count as equal: quaternions are drawn from f32, which holds no more.
-const EQUAL_BELOW: f64 = 1e-5;
+pub(super) const EQUAL_BELOW: f64 = 1e-5;
 /// Images beyond this, dB, count as equal: f32 images hold no more.
-const EQUAL_BEYOND: f64 = 120.0;
+pub(super) const EQUAL_BEYOND: f64 = 120.0;
 
 /// What a time is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,30 +93,40 @@ impl Sweep {
         format!("{}/{}/{}", self.id, row.motion, row.choice.join("/"))
     }
 
-    /// Cost and error of a row, smaller being better; none if nothing was measured.
-    pub fn cost_and_error(&self, row: &SweepRow) -> Option<[f64; 2]> {
+    /// What a row costs: bytes, or time in the sweep's unit; none if that was not measured.
+    pub fn cost(&self, row: &SweepRow) -> Option<f64> {
         let outcome = row.outcome.as_ref().ok()?;
-        let cost = if self.by_bytes { outcome.bytes? } else { outcome.time?.median * self.unit.factor() };
-        let error = match (outcome.degrees, outcome.fidelity) {
-            (Some(degrees), _) => degrees.max.max(EQUAL_BELOW),
-            (None, Some(fidelity)) => -fidelity.decibels().min(EQUAL_BEYOND),
-            (None, None) => return None,
-        };
-        Some([cost, error])
+        if self.by_bytes { outcome.bytes } else { Some(outcome.time?.median * self.unit.factor()) }
     }
 
-    /// Per row, whether no other row of the same motion is at least as good in cost and error and better in one.
+    /// What a row is judged by, smaller being better: cost, then 95 % and all of the angles, or else twice the negative
+    /// PSNR. None if one was not measured, or if the sweep has angles and the row has none.
+    fn criteria(&self, row: &SweepRow) -> Option<[f64; 3]> {
+        let outcome = row.outcome.as_ref().ok()?;
+        let cost = self.cost(row)?;
+        let by_angle = self.has(|o| o.degrees.is_some());
+        match (outcome.degrees, outcome.fidelity) {
+            (Some(degrees), _) => Some([cost, degrees.p95.max(EQUAL_BELOW), degrees.max.max(EQUAL_BELOW)]),
+            (None, Some(fidelity)) if !by_angle => {
+                let error = -fidelity.decibels().min(EQUAL_BEYOND);
+                Some([cost, error, error])
+            }
+            _ => None,
+        }
+    }
+
+    /// Per row, whether no other row of the same motion is at least as good in cost and errors and better in one.
     pub fn front(&self) -> Vec<bool> {
         let mut on_front = vec![false; self.rows.len()];
         let mut motions: Vec<&str> = self.rows.iter().map(|row| row.motion).collect();
         motions.sort_unstable();
         motions.dedup();
         for motion in motions {
-            let members: Vec<(usize, [f64; 2])> = (0..self.rows.len())
+            let members: Vec<(usize, [f64; 3])> = (0..self.rows.len())
                 .filter(|&i| self.rows[i].motion == motion)
-                .filter_map(|i| Some((i, self.cost_and_error(&self.rows[i])?)))
+                .filter_map(|i| Some((i, self.criteria(&self.rows[i])?)))
                 .collect();
-            let points: Vec<[f64; 2]> = members.iter().map(|&(_, point)| point).collect();
+            let points: Vec<[f64; 3]> = members.iter().map(|&(_, point)| point).collect();
             for ((i, _), front) in members.iter().zip(pareto_front(&points)) {
                 on_front[*i] = front;
             }
@@ -182,10 +192,11 @@ impl Sweep {
                     None => number(None),
                 });
             }
-            cells.push(Cell::text(match (&row.outcome, on_front) {
+            cells.push(Cell::text(match (&row.outcome, self.criteria(row)) {
                 (Err(_), _) => "not run",
-                (_, true) => "front",
-                (_, false) => "beaten",
+                (Ok(_), None) => "not judged",
+                (Ok(_), Some(_)) if on_front => "front",
+                (Ok(_), Some(_)) => "beaten",
             }));
             let note = match &row.outcome {
                 Err(problem) => problem,

@@ -1,7 +1,7 @@
 //! What everything is measured on: an avatar, its body, and two motions.
 
 use super::exact::{Rig, Shot};
-use super::{Error, motion};
+use super::{Error, motion, sweep};
 use crate::data::{Sequence, Subject};
 use crate::experiment::evenly_spaced;
 use crate::experiment::recipe::{BindTo, Placement};
@@ -22,6 +22,8 @@ pub struct Options {
     pub repeats: usize,
     /// Fewer solvers.
     pub quick: bool,
+    /// At most so many Gaussians, evenly spaced and enlarged to cover what the others did.
+    pub most_gaussians: Option<usize>,
     /// How the avatar is made, if none is given: one Gaussian per vertex or per face of the refined body.
     pub placement: Placement,
     /// Edges of the body are halved until none is longer, metres.
@@ -38,6 +40,7 @@ impl Options {
             resolution: 512,
             repeats: 9,
             quick: false,
+            most_gaussians: None,
             placement: Placement::Vertices,
             longest_edge: 0.014,
             training_frames: 24,
@@ -51,6 +54,7 @@ impl Options {
             resolution: 128,
             repeats: 3,
             quick: true,
+            most_gaussians: Some(2000),
             longest_edge: 0.06,
             training_frames: 6,
             ..Self::standard()
@@ -126,6 +130,13 @@ impl Stage {
                     .to_owned(),
             });
         }
+        avatar.validate(Some(&body))?;
+        let avatar = match options.most_gaussians {
+            Some(most) if most < avatar.gaussians.len() => {
+                sparser(&avatar, most, body.skeleton.num_joints())?
+            }
+            _ => avatar,
+        };
         let bound = BoundAvatar::new(&avatar, &body)?;
         let weights = weights_of(&avatar, &body)?;
         let rig = Rig::new(body, weights, &avatar.gaussians);
@@ -208,6 +219,16 @@ fn made(training: &Sequence, options: &Options) -> Result<Avatar, Error> {
         ..SurfaceInit::default()
     };
     Ok(surface_init(training, &init)?)
+}
+
+/// Some of the Gaussians, evenly spaced in their order, each as much larger in area as there are fewer.
+fn sparser(avatar: &Avatar, most: usize, joints: usize) -> Result<Avatar, Error> {
+    let all: Vec<usize> = (0..avatar.gaussians.len()).collect();
+    let kept = evenly_spaced(&all, Some(most));
+    let mut sparse = sweep::subset(avatar, &kept, joints)?;
+    let wider = (0.5 * (all.len() as f64 / kept.len() as f64).ln()) as f32;
+    sparse.gaussians.log_scales.iter_mut().for_each(|scale| *scale += wider);
+    Ok(sparse)
 }
 
 /// The skinning weights of each Gaussian: its own, or those of its face.

@@ -124,13 +124,3 @@ pub(super) fn range(values: impl Iterator<Item = f64>, logarithmic: bool) -> std
         low - room..high + room
     }
 }
-
-/// A tick of a logarithmic axis.
-pub(super) fn power_of_ten(value: f64) -> String {
-    let exponent = value.log10();
-    if (exponent - exponent.round()).abs() > 1e-6 || (-3.0..=4.0).contains(&exponent) {
-        let digits = (-exponent.floor()).clamp(0.0, 6.0) as usize;
-        return format!("{value:.digits$}");
-    }
-    format!("1e{}", exponent.round())
-}

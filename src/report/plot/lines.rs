@@ -1,12 +1,12 @@
 //! Named curves over a common x.
 
 use super::PlotError;
-use super::canvas::{COLOURS, FAMILY, Figure, INK, PALE, power_of_ten, range};
+use super::canvas::{COLOURS, FAMILY, Figure, INK, PALE, range};
+use super::log_axis::{LogAxis, tick};
 use plotters::backend::DrawingBackend;
 use plotters::chart::{ChartBuilder, ChartContext, SeriesLabelPosition};
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
-use plotters::coord::combinators::IntoLogRange;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::drawing::DrawingArea;
 use plotters::element::{Circle, PathElement};
@@ -69,8 +69,8 @@ impl Figure for Lines {
             .x_label_area_size(48)
             .y_label_area_size(72);
         if self.log_y {
-            let chart = builder.build_cartesian_2d(xs, ys.log_scale()).map_err(PlotError::backend)?;
-            self.fill(chart, &power_of_ten)
+            let chart = builder.build_cartesian_2d(xs, LogAxis(ys)).map_err(PlotError::backend)?;
+            self.fill(chart, &tick)
         } else {
             let chart = builder.build_cartesian_2d(xs, ys).map_err(PlotError::backend)?;
             self.fill(chart, &plain)

@@ -7,6 +7,7 @@
 mod canvas;
 mod labels;
 mod lines;
+mod log_axis;
 mod scatter;
 
 pub use canvas::{PlotError, SIZE, png, svg};

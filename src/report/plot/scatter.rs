@@ -1,12 +1,12 @@
 //! Cost against error on logarithmic axes.
 
 use super::PlotError;
-use super::canvas::{COLOURS, FAMILY, Figure, INK, PALE, SIZE, power_of_ten, range};
+use super::canvas::{COLOURS, FAMILY, Figure, INK, PALE, SIZE, range};
 use super::labels::{FONT_SIZE, Taken};
+use super::log_axis::{LogAxis, tick};
 use plotters::backend::DrawingBackend;
 use plotters::chart::ChartBuilder;
 use plotters::coord::Shift;
-use plotters::coord::combinators::IntoLogRange;
 use plotters::drawing::DrawingArea;
 use plotters::element::{Circle, PathElement, Text};
 use plotters::style::{Color, IntoFont, RGBColor, ShapeStyle};
@@ -76,7 +76,7 @@ impl Figure for Scatter {
             .caption(&self.title, (FAMILY, 20).into_font().color(&INK))
             .x_label_area_size(48)
             .y_label_area_size(72)
-            .build_cartesian_2d(xs.log_scale(), ys.log_scale())
+            .build_cartesian_2d(LogAxis(xs), LogAxis(ys))
             .map_err(PlotError::backend)?;
         chart
             .configure_mesh()
@@ -84,8 +84,8 @@ impl Figure for Scatter {
             .y_desc(&self.y_label)
             .axis_desc_style((FAMILY, 15))
             .label_style((FAMILY, 13))
-            .x_label_formatter(&|v| power_of_ten(*v))
-            .y_label_formatter(&|v| power_of_ten(*v))
+            .x_label_formatter(&|v| tick(*v))
+            .y_label_formatter(&|v| tick(*v))
             .bold_line_style(PALE)
             .light_line_style(RGBColor(245, 245, 245))
             .draw()

@@ -122,8 +122,8 @@ fn with_degree(gaussians: &Gaussians, degree: usize) -> Gaussians {
     Gaussians { sh_degree: degree.min(gaussians.sh_degree), sh, ..gaussians.clone() }
 }
 
-/// The avatar of these Gaussians alone, in their order; `weights` are those of all.
-fn subset(avatar: &Avatar, kept: &[usize], joints: usize) -> Result<Avatar, Error> {
+/// The avatar of these Gaussians alone, in this order.
+pub(super) fn subset(avatar: &Avatar, kept: &[usize], joints: usize) -> Result<Avatar, Error> {
     let from = &avatar.gaussians;
     let count = from.sh_count();
     let gaussians = Gaussians {

@@ -10,6 +10,7 @@ use crate::trade::reference::{self, Cutoffs};
 use crate::trade::{Error, Outcome, Sweep, SweepRow, Unit};
 use glam::Vec3;
 use half::f16;
+use half::slice::HalfFloatSliceExt;
 
 /// A group of parameters that may be stored in 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,7 +161,9 @@ fn decoding(bench: &Bench, parts: &[Part]) -> crate::trade::Spread {
     let time = bench.time(|| {
         decoded.clear();
         for (narrow, wide) in &stored {
-            decoded.extend(narrow.iter().map(|v| v.to_f32()));
+            let start = decoded.len();
+            decoded.resize(start + narrow.len(), 0.0);
+            narrow.convert_to_f32_slice(&mut decoded[start..]);
             decoded.extend_from_slice(wide);
         }
         decoded.last().copied()
