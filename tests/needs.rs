@@ -275,3 +275,102 @@ fn bounds_are_near_for_two_bones() {
         assert!(*tightness >= least, "{choice}: the error is at most {tightness} of the bound");
     }
 }
+
+/// Counts, degrees and joints of an avatar that is small enough to count by hand.
+#[test]
+fn needs_of_a_hand_made_avatar() {
+    let body = rig::body();
+    let rows =
+        [vec![(1, 1.0f32)], vec![(1, 0.5), (3, 0.5)], vec![(1, 0.25), (2, 0.25), (3, 0.5)], vec![(1, 1.0)]];
+    let weights = SkinWeights::from_rows(rows, rig::JOINTS).unwrap();
+    let mut gaussians = rig::gaussians(vec![Vec3::ZERO; 4], 1, 3);
+    for own in gaussians.sh.chunks_exact_mut(16) {
+        own[4..].fill([0.0; 3]);
+    }
+    gaussians.sh[16 + 8] = [0.0, 1e-3, 0.0];
+    let bound = BoundAvatar::new(&Avatar { gaussians, binding: Binding::Vertex(weights) }, &body).unwrap();
+    let turned = |angle: f64| {
+        let mut angles = [DVec3::ZERO; rig::JOINTS];
+        angles[3] = DVec3::Z * angle;
+        Pose::from_axis_angles(&body.skeleton, &angles, DVec3::ZERO)
+    };
+    let poses = [turned(0.2), turned(1.0), turned(-0.3)];
+    let needs = Needs::new(&bound, &body, &poses, &Needs::listed(), 0.5).unwrap();
+    assert_eq!((needs.gaussians, needs.poses), (4, 3));
+    assert_eq!((needs.sh_degree_stored, needs.sh_degree_present), (3, 2));
+    assert_eq!(needs.influences, [0, 2, 1, 1]);
+    assert_eq!(needs.joints_used, [1, 2, 3]);
+    let pairs: Vec<_> = needs.pairs.iter().map(|pair| (pair.joints, pair.gaussians)).collect();
+    assert_eq!(pairs, [([1, 2], 1), ([1, 3], 2), ([2, 3], 1)]);
+    assert!((needs.worst_angle.value - 1f64.to_degrees()).abs() < 1e-9 && needs.worst_angle.pose == 1);
+    // Both blended Gaussians hang half on either side of the joint: gap cos(t/2).
+    for gap in [needs.gap.unwrap(), needs.gap_bound] {
+        assert!((gap.value - 0.5f64.cos()).abs() < 1e-9 && gap.pose == 1, "{gap:?}");
+    }
+    // At rest everything is exact but for rounding.
+    let rest = Needs::new(&bound, &body, &[], &Needs::listed(), 0.5).unwrap();
+    assert_eq!(rest.verdict.cheapest.unwrap().rotation.to_string(), "power-0");
+    assert!(rest.worst_angle.value == 0.0 && rest.gap.unwrap().value > 1.0 - 1e-12);
+}
+
+/// The gap that branch and bound finds is the smallest of all Gaussians in all poses.
+#[test]
+fn the_smallest_gap_is_found() {
+    for seed in 0..40 {
+        let shape = Shape {
+            bones: 2 + seed as usize % 4,
+            bend: 0.05 * seed as f64,
+            exponent: 1.0,
+            hinge: seed % 3 == 0,
+        };
+        let rig = make(shape, seed);
+        let bound = BoundAvatar::new(&rig.avatar, &rig.body).unwrap();
+        let poses = [rig.pose.clone(), Pose::rest(&rig.body.skeleton)];
+        let needs = Needs::new(&bound, &rig.body, &poses, &[], 0.5).unwrap();
+        let body = PosedBody::new(&rig.body, &rig.pose).unwrap();
+        let smallest = (0..GAUSSIANS)
+            .map(|i| {
+                let (quats, weights) = bones(&rig, &body, i);
+                let sum: f64 = weights.iter().sum();
+                let mut outer = [[0.0; 4]; 4];
+                for (q, w) in quats.iter().zip(&weights) {
+                    (0..4).for_each(|i| (0..4).for_each(|j| outer[i][j] += w / sum * q[i] * q[j]));
+                }
+                let values = skinsplat::math::average::eigen::SymmetricEigen::new(outer).values;
+                values[0] - values[1]
+            })
+            .fold(1.0, f64::min);
+        let found = needs.gap.unwrap().value;
+        assert!((found - smallest).abs() < 1e-7, "{found} {smallest}");
+        assert!(needs.gap_bound.value <= smallest + 1e-7);
+    }
+}
+
+/// Keeping fewer influences moves the average by no more than its bound.
+#[test]
+fn fewer_influences_stay_within_their_bound() {
+    for seed in 0..600 {
+        let shape = Shape {
+            bones: 2 + seed as usize % 5,
+            bend: 0.003 * seed as f64,
+            exponent: 3.0,
+            hinge: seed % 2 == 0,
+        };
+        let rig = make(shape, seed);
+        let bound = BoundAvatar::new(&rig.avatar, &rig.body).unwrap();
+        let body = PosedBody::new(&rig.body, &rig.pose).unwrap();
+        let bounds = PoseBounds::new(&bound, &body);
+        for (kept, i) in (1..=4).flat_map(|kept| (0..GAUSSIANS).map(move |i| (kept, i))) {
+            let limit = bounds.fewer_influences(kept);
+            let (quats, weights) = bones(&rig, &body, i);
+            let exact = average_rotation(&quats, &weights, Solver::Eigen).unwrap();
+            let mut order: Vec<usize> = (0..weights.len()).collect();
+            order.sort_by(|&a, &b| weights[b].total_cmp(&weights[a]));
+            let (quats, weights): (Vec<_>, Vec<_>) =
+                order.iter().take(kept).map(|&j| (quats[j], weights[j])).unzip();
+            let fewer = average_rotation(&quats, &weights, Solver::Eigen).unwrap();
+            let error = angle_between(fewer, exact).to_degrees();
+            assert!(error <= limit + 1e-9, "{kept} of {}: {error} > {limit}", order.len());
+        }
+    }
+}

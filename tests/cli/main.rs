@@ -16,6 +16,7 @@ mod catalogues;
 mod fitting;
 mod lpips;
 mod made_up;
+mod needs;
 mod posing;
 mod rendering;
 mod reports;
