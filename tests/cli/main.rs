@@ -21,4 +21,5 @@ mod rendering;
 mod reports;
 mod scoring;
 mod scoring_inputs;
+mod stressing;
 mod usage;
