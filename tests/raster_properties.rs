@@ -157,7 +157,7 @@ proptest! {
     #[test]
     fn extreme_numbers_stay_finite(seed: u64) {
         let mut random = Random(seed);
-        let mut extreme = |random: &mut Random| {
+        let extreme = |random: &mut Random| {
             let size = 10f64.powf(random.between(-38.0, 38.0)) as f32;
             [0.0, 1.0, -1.0, size, -size, 0.2, 1.0 / 255.0, f32::MAX, f32::MIN_POSITIVE][random.below(9)]
         };
