@@ -150,6 +150,38 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+
+    /// Any finite number anywhere: the image is finite, and alpha a share.
+    #[test]
+    fn extreme_numbers_stay_finite(seed: u64) {
+        let mut random = Random(seed);
+        let extreme = |random: &mut Random| {
+            let size = 10f64.powf(random.between(-38.0, 38.0)) as f32;
+            [0.0, 1.0, -1.0, size, -size, 0.2, 1.0 / 255.0, f32::MAX, f32::MIN_POSITIVE][random.below(9)]
+        };
+        let mut posed = posed(&mut random, 40);
+        for i in 0..posed.len() {
+            match random.below(4) {
+                0 => posed.means[i][random.below(3)] = extreme(&mut random),
+                1 => posed.factors[i].col_mut(random.below(3))[random.below(3)] = extreme(&mut random),
+                2 => posed.opacities.to_mut()[i] = extreme(&mut random).clamp(0.0, 1.0),
+                _ => {
+                    let k = random.below(posed.sh.len());
+                    posed.sh.to_mut()[k][random.below(3)] = extreme(&mut random).clamp(-1e30, 1e30);
+                }
+            }
+        }
+        let camera = camera(&mut random, 40, 30);
+        let rendered = render(&posed, &camera, &settings(&mut random));
+        for pixel in channels(&rendered) {
+            prop_assert!(pixel[..3].iter().all(|v| v.is_finite()), "{pixel:?}");
+            prop_assert!((0.0..=1.0).contains(&pixel[3]) && pixel[4].is_finite(), "{pixel:?}");
+        }
+    }
+}
+
 #[test]
 fn nothing_in_view_leaves_the_background() {
     let (all, camera, settings) = scene(5, 50, 37, 21);

@@ -163,7 +163,8 @@ fn blend<'a>(splats: impl Iterator<Item = &'a Splat>, pixel: DVec2, background: 
 fn project(posed: &Posed, i: usize, camera: &Camera, settings: &RenderSettings) -> Option<Splat> {
     let world = posed.means[i].as_dvec3();
     let p = camera.camera_from_world.transform_point3(world);
-    if p.z <= 0.2 {
+    // The constant of the original is an f32.
+    if p.z <= f64::from(0.2f32) {
         return None;
     }
     let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));

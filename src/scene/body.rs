@@ -1,6 +1,7 @@
 //! Bodies: skeleton, template mesh, shape space, skinning weights; forward kinematics and linear blend skinning.
 
 use super::{LocalTransform, Pose, SceneError, SkinWeights};
+use crate::math::rotation::unique_nearest_rotation;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use std::sync::OnceLock;
 
@@ -110,6 +111,20 @@ impl Skeleton {
             };
         }
         world
+    }
+
+    /// Rotation of every node relative to the rest pose, scales left out.
+    fn turns(&self, pose: &Pose) -> Vec<DQuat> {
+        let chained = |locals: &[LocalTransform]| {
+            let mut world = vec![DQuat::IDENTITY; self.len()];
+            for &node in &self.order {
+                let local = locals[node].rotation;
+                world[node] = self.parents[node].map_or(local, |parent| world[parent] * local);
+            }
+            world
+        };
+        let (posed, rest) = (chained(&pose.locals), chained(&self.rest_locals));
+        posed.iter().zip(rest).map(|(posed, rest)| (*posed * rest.inverse()).normalize()).collect()
     }
 }
 
@@ -280,7 +295,8 @@ impl Body {
 pub struct JointTransform {
     /// Linear part (a rotation for SMPL; may carry scale in glTF).
     pub linear: DMat3,
-    /// The rotation of `linear` (its polar factor): the b_j of Eq. 7.
+    /// The rotation of `linear`: the b_j of Eq. 7. Its polar factor; where that is not unique (a joint scaled to nothing,
+    /// or mirrored), the chain of rotations without scales.
     pub rotation: DQuat,
     /// Metres.
     pub translation: DVec3,
@@ -339,9 +355,11 @@ impl<'a> PosedBody<'a> {
             return Err(SceneError::new("transl", "NaN or infinite", "finite metres"));
         }
         let world = skeleton.world_transforms(pose);
+        let turns = std::cell::OnceCell::new();
         let joint = |(index, (world, bind)): (usize, (&DAffine3, &DAffine3))| {
             let skin = *world * *bind;
-            let rotation = || crate::math::rotation::nearest_rotation(skin.matrix3);
+            let chained = || turns.get_or_init(|| skeleton.turns(pose))[index];
+            let rotation = || unique_nearest_rotation(skin.matrix3).unwrap_or_else(chained);
             JointTransform {
                 linear: skin.matrix3,
                 rotation: if reads(index) { rotation() } else { DQuat::IDENTITY },
@@ -445,6 +463,21 @@ mod tests {
         assert!((mesh.vertices[0] - Vec3::new(1.0, 1.0, 3.0)).length() < 1e-6);
         assert!((mesh.vertices[1] - Vec3::new(0.5, 0.0, 3.0)).length() < 1e-6);
         assert!(posed.joints[1].rotation.angle_between(DQuat::from_rotation_z(quarter.z)) < 1e-7);
+    }
+
+    #[test]
+    fn joints_that_vanish_or_mirror_keep_the_rotation_of_their_chain() {
+        let body = arm();
+        let world = DQuat::from_scaled_axis(DVec3::new(0.3, -1.2, 0.5));
+        let elbow = DQuat::from_scaled_axis(DVec3::new(-0.7, 0.2, 1.9));
+        for scale in [DVec3::ZERO, DVec3::new(1.0, 1.0, -1.0), -DVec3::ONE, DVec3::ONE] {
+            let mut pose = Pose::rest(&body.skeleton);
+            pose.locals[0].rotation = world;
+            (pose.locals[1].rotation, pose.locals[1].scale) = (elbow, scale);
+            let posed = PosedBody::new(&body, &pose).unwrap();
+            let off = posed.joints[1].rotation.angle_between(world * elbow);
+            assert!(off < 1e-7, "{scale}: {off}");
+        }
     }
 
     #[test]

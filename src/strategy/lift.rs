@@ -8,7 +8,7 @@
 //! blend is continuous while every joint stays within 180° of its parent's rest frame, however far the chain turns) or
 //! the frame before (continuous through any motion of less than 180° per joint and frame).
 
-use crate::math::{Quaternion, dot4, rotation};
+use crate::math::{Quaternion, rotation};
 use crate::scene::PosedBody;
 
 /// Joint quaternions of one pose, relative to the rest pose, with signs that belong together.
@@ -81,7 +81,7 @@ impl JointLift {
         };
         let of_parent = self.lifted[parent];
         let relative = rotation::multiply(rotation::conjugate(of_parent), own);
-        let sign = if dot4(relative, near) < 0.0 { -1.0 } else { 1.0 };
+        let sign = if rotation::is_opposite(relative, near) { -1.0 } else { 1.0 };
         self.relative[joint] = relative.map(|c| c * sign);
         self.lifted[joint] = own.map(|c| c * sign);
     }

@@ -3,7 +3,7 @@
 use super::exact::Exact;
 use super::method::{Answer, METHODS, Method};
 use super::problem::{FAMILIES, Family, Problem, random_rotation};
-use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, shown};
+use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, exactly, shown};
 use crate::math::random::SplitMix64;
 use crate::math::rotation::angle_between;
 use crate::math::{Matrix3, Quaternion, Real, matrix3, rotation};
@@ -133,7 +133,7 @@ fn line<T: Real>(precision: &'static str, method: Method, family: &Family, quick
         line.rows.push(Row {
             section: SECTION,
             family: family.id.to_owned(),
-            input: shown(x),
+            input: exactly(x),
             subject: method.to_string(),
             precision,
             finite: Cell::Flag(answer.is_some()),

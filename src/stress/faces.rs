@@ -1,7 +1,7 @@
 //! Section `faces`: frames on triangles that are slivers, tiny, far away, inverted or without area.
 
 use super::averages::rotation_error;
-use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, shown};
+use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, exactly};
 use crate::math::rotation::{angle_between, polar};
 use crate::math::{Matrix3, Quaternion, matrix3};
 use crate::strategy::{FaceFrame, RotationChoice, face_frame};
@@ -113,11 +113,11 @@ pub(super) fn run() -> Findings {
                 let measured = measure(kind, family, x);
                 let verdict = measured.as_ref().map_or(Verdict::Degrades, |m| m.verdict);
                 let degrees = measured.as_ref().map_or(Cell::Word("no frame"), |m| Cell::number(m.degrees));
-                cells.push(format!("{}: {degrees}", shown(x)));
+                cells.push(format!("{}: {degrees}", exactly(x)));
                 findings.rows.push(Row {
                     section: SECTION,
                     family: family.id.to_owned(),
-                    input: shown(x),
+                    input: exactly(x),
                     subject: RotationChoice::FaceFrame(kind).to_string(),
                     precision: "f32",
                     finite: Cell::Flag(true),

@@ -55,8 +55,7 @@ fn strip(
     rotation: RotationChoice,
     axis: DVec3,
 ) -> Result<Image, StrategyError> {
-    let middle = stage::LENGTH / stage::BONES as f64;
-    let target = DVec3::X * middle;
+    let target = stage::moving_joint(body);
     let camera = Camera::look_at(
         target + DVec3::new(0.0, 0.25, 0.6),
         target,

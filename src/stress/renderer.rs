@@ -1,7 +1,7 @@
 //! Section `renderer`: the splat renderer on extreme scenes, against the definition of the image in `f64`.
 
 use super::scenes::{FAMILIES, Family, Scene};
-use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, shown};
+use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, exactly, shown};
 use crate::render::definition;
 use crate::render::splat::{RenderSettings, Renderer, SimdLevel, render};
 use crate::scene::Rendered;
@@ -83,7 +83,7 @@ pub(super) fn run(quick: bool) -> Findings {
             let measured = measure(&(family.make)(x), true);
             let row = row(family, x, &measured);
             worst = worst.max(row.verdict);
-            cells.push(format!("{}: {}", shown(x), row.error));
+            cells.push(format!("{}: {}", exactly(x), row.error));
             if row.verdict == Verdict::Breaks {
                 if let Some(sound) = sound.filter(|_| family.continuous) {
                     findings.thresholds.push(threshold(family, sound, x));
@@ -128,7 +128,7 @@ fn row(family: &Family, x: f64, measured: &Measured) -> Row {
     Row {
         section: SECTION,
         family: family.id.to_owned(),
-        input: shown(x),
+        input: exactly(x),
         subject: "splat renderer".to_owned(),
         precision: "f32",
         finite: Cell::Flag(measured.finite),

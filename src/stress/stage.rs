@@ -40,6 +40,11 @@ pub(super) fn moved(pose: &Pose, rotation: DQuat, translation: DVec3) -> Pose {
     moved
 }
 
+/// Where the first joint is that moves, in the rest pose.
+pub(super) fn moving_joint(body: &RestBody) -> DVec3 {
+    -body.skeleton.inverse_binds[1].translation
+}
+
 /// What the probes hang on: shares of the joints.
 pub(super) const PROBES: [(&str, &[(usize, f32)]); 6] = [
     ("equal pair", &[(0, 0.5), (1, 0.5)]),
@@ -54,9 +59,9 @@ pub(super) const PROBES: [(&str, &[(usize, f32)]); 6] = [
 ///
 /// # Errors
 /// None: the rows sum to one.
-pub(super) fn probes() -> Result<Avatar, SceneError> {
+pub(super) fn probes(body: &RestBody) -> Result<Avatar, SceneError> {
     let n = PROBES.len();
-    let joint = (LENGTH / BONES as f64) as f32;
+    let joint = moving_joint(body).x as f32;
     let place = |i: usize| {
         let (sin, cos) = (i as f32).sin_cos();
         Vec3::new(joint, RADIUS as f32 * cos, RADIUS as f32 * sin)

@@ -65,6 +65,11 @@ pub(super) fn shown(value: f64) -> String {
     }
 }
 
+/// An input, with every digit that it has.
+pub(super) fn exactly(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e5).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
+}
+
 /// How a subject bears an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]

@@ -22,4 +22,5 @@ mod rendering;
 mod reports;
 mod scoring;
 mod scoring_inputs;
+mod stressing;
 mod usage;

@@ -159,3 +159,22 @@ fn gltf_clips_pose_by_name() {
     skin(args!["--clip", "dance"]).refuses(&["ava_smpl24_4inf.glb", "dance", "twist", "squat"], "clip");
     skin(args![]).refuses(&["ava_smpl24_4inf.glb", "twist", "squat"], "no clip");
 }
+
+#[test]
+fn continuity_is_a_choice_of_signs() {
+    let desk = Desk::new();
+    let skin = |out: &str, more: &[&str], strategy: &str| {
+        let mut arguments = with_posing(args!["skin", avatar(), "--out", out], strategy);
+        arguments.extend(more.iter().map(OsString::from));
+        desk.ok(arguments);
+        desk.bytes(out)
+    };
+    let named = skin("a.ply", &[], "quaternion-average+rotation=lifted-sum");
+    assert!(skin("b.ply", &["--continuity", "rest"], "quaternion-average") == named);
+    // The second pose of a track that starts within 180 degrees of rest has the same signs.
+    assert!(skin("c.ply", &["--continuity", "previous"], "quaternion-average") == named);
+    assert!(skin("d.ply", &[], "quaternion-average") != named);
+    let mut refused = with_posing(args!["skin", avatar(), "--out", "e.ply"], "lbs");
+    refused.extend(args!["--continuity", "rest"]);
+    desk.run(refused).refuses(&["--continuity", "gram-schmidt-columns", "average"], "another rotation");
+}

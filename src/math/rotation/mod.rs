@@ -8,7 +8,9 @@ pub use convert::{
     SignPolicy, matrix_to_quaternion, matrix_to_quaternion_raw, quaternion_to_matrix,
     quaternion_to_matrix_raw,
 };
-pub use projection::{gram_schmidt_columns, gram_schmidt_rows, nearest_rotation, polar};
+pub use projection::{
+    gram_schmidt_columns, gram_schmidt_rows, nearest_rotation, polar, unique_nearest_rotation,
+};
 pub(crate) use projection::{is_distinct, proper_polar_factor};
 
 use super::{Quaternion, Real, dot4};

@@ -63,6 +63,9 @@ fn davenport<T: Real>(m: Matrix3<T>) -> [[T; 4]; 4] {
 /// the element nearest to the identity of the nearest rotations; if the identity is at right angles (180°) to them
 /// all, that nearest to the half turn about x, then y, then z. `None` if an entry is not finite.
 pub fn polar<T: Real>(m: Matrix3<T>) -> Option<Quaternion<T>> {
+    if let Some(unique) = unique_polar(m) {
+        return Some(unique);
+    }
     let scale = matrix3::max_abs(m);
     if !matrix3::is_finite(m) {
         return None;
@@ -71,14 +74,20 @@ pub fn polar<T: Real>(m: Matrix3<T>) -> Option<Quaternion<T>> {
         return Some(identity());
     }
     let m = m.map(|row| row.map(|c| c / scale));
-    if let Some(rotation) = proper_polar_factor(m) {
-        return Some(matrix_to_quaternion(rotation));
-    }
     let axes = SymmetricEigen::<T>::AXES;
     let eigen = SymmetricEigen::new(davenport(m));
     let shift = T::from_f64(4.0) * (eigen.values[0].abs().max(eigen.values[3].abs()));
     let quat = eigen::nearest_in_top_space(&eigen, shift, axes.iter().map(|&axis| (axis, T::ONE)));
     Some(SignPolicy::NonNegativeW.apply(quat, quat))
+}
+
+/// [`polar`] where it is unique; `None` elsewhere.
+fn unique_polar<T: Real>(m: Matrix3<T>) -> Option<Quaternion<T>> {
+    let scale = matrix3::max_abs(m);
+    if !matrix3::is_finite(m) || scale == T::ZERO {
+        return None;
+    }
+    proper_polar_factor(m.map(|row| row.map(|c| c / scale))).map(matrix_to_quaternion)
 }
 
 /// `U diag(1, 1, det(U Vᵀ)) Vᵀ`, or `None` where it is not unique. The entries of `m` are of moderate size and not all zero.
@@ -134,4 +143,10 @@ fn one_sided_jacobi<T: Real>(mut columns: [[T; 3]; 3]) -> ([[T; 3]; 3], [[T; 3];
 pub fn nearest_rotation(m: DMat3) -> DQuat {
     let [w, x, y, z] = polar(m.transpose().to_cols_array_2d()).unwrap_or_else(identity);
     DQuat::from_xyzw(x, y, z, w)
+}
+
+/// [`nearest_rotation`] where it is unique: not for a matrix that vanishes or mirrors evenly.
+pub fn unique_nearest_rotation(m: DMat3) -> Option<DQuat> {
+    let [w, x, y, z] = unique_polar(m.transpose().to_cols_array_2d())?;
+    Some(DQuat::from_xyzw(x, y, z, w))
 }

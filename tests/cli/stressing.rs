@@ -1,0 +1,53 @@
+//! `stress`.
+
+use crate::args;
+use crate::program::Desk;
+
+#[test]
+fn a_quick_examination_writes_its_report_and_pictures() {
+    let desk = Desk::new();
+    let shown = desk.ok(args!["stress", "--quick", "--only", "sequences,faces,scales", "--out", "report"]);
+    assert_eq!(desk.read("report/stress.md"), shown);
+    for heading in ["Smooth sequences", "Frames on bad faces", "Extreme scales", "The remedy", "lifted-sum"] {
+        assert!(shown.contains(heading), "{heading}");
+    }
+    assert!(!shown.contains("Solvers on hard averages") && !shown.contains("NaN"));
+    let report: serde_json::Value = serde_json::from_str(&desk.read("report/stress.json")).unwrap();
+    assert_eq!(report["schema"], "stress-1");
+    let pictures = report["pictures"].as_array().unwrap();
+    assert!(!pictures.is_empty());
+    for picture in pictures {
+        let file = picture["file"].as_str().unwrap();
+        assert!(shown.contains(&format!("({file})")), "{file}");
+        let image = image::open(desk.path(&format!("report/{file}"))).unwrap().to_rgb8();
+        assert!(image.pixels().any(|p| p.0 != [255; 3]), "{file}: nothing is drawn");
+    }
+    let rows = desk.read("report/stress.csv");
+    assert!(rows.lines().count() > 100 && rows.starts_with("section,family,input,subject,precision,"));
+
+    // The same bytes from one thread, in silence.
+    let again = args![
+        "stress",
+        "-q",
+        "--quick",
+        "--only",
+        "sequences,faces,scales",
+        "--out",
+        "again",
+        "--threads",
+        "1"
+    ];
+    assert_eq!(desk.ok(again), "");
+    for file in ["stress.md", "stress.csv", "stress.json"] {
+        assert_eq!(desk.read(&format!("report/{file}")), desk.read(&format!("again/{file}")), "{file}");
+    }
+}
+
+#[test]
+fn unknown_sections_and_unwritable_folders_are_refused() {
+    let desk = Desk::new();
+    desk.run(args!["stress", "--only", "everything"])
+        .refuses(&["everything", "averages", "renderer"], "section");
+    desk.put("file", "");
+    desk.run(args!["stress", "--quick", "--only", "faces", "--out", "file/x"]).refuses(&["file/x"], "folder");
+}
