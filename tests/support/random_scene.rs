@@ -1,5 +1,5 @@
 //! Small random scenes for the rasterizer's property tests.
-#![allow(unreachable_pub, reason = "shared by tests")]
+#![allow(dead_code, unreachable_pub, reason = "shared by tests")]
 
 use glam::{DMat3, DMat4, DVec3, Mat3, Quat, Vec3};
 use skinsplat::scene::{Camera, ColourClamp, Posed};
