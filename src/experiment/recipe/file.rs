@@ -146,6 +146,10 @@ mod tests {
             "pure-skinned+start.opacity=1.0",
             "pure-skinned+strategy=none",
             "pure-skinned+iterations=0",
+            "hugs-skinned+free.position=along-normal",
+            "hugs-skinned+free.rotation=about-normal",
+            "haha+mesh.texture=0",
+            "haha+mesh.rate=-1.0",
             "pure-skinned+strategy=\"lbs",
         ] {
             assert!(parse(wrong).is_err(), "{wrong}");

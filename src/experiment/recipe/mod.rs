@@ -335,6 +335,12 @@ impl Recipe {
         if super::catalog::strategy(&self.strategy).is_err() {
             return refuse("strategy", format!("`{}`", self.strategy), "the id or spec of a strategy");
         }
+        let tied = self.free.position == FreePosition::AlongNormal
+            || self.free.rotation == FreeRotation::AboutNormal;
+        if self.densify.is_some() && tied {
+            let expected = "free.position and free.rotation that are not measured from the start";
+            return refuse("densify", "new Gaussians have no start".to_owned(), expected);
+        }
         if let Some(mesh) = &self.mesh {
             if mesh.texture == 0 {
                 return refuse("mesh.texture", mesh.texture.to_string(), "at least 1 texel");
