@@ -235,7 +235,8 @@ fn bad_input_is_one_line() {
         all.extend(more);
         desk.run(all)
     };
-    quick(args!["nobody"]).refuses(&["subject `nobody`", "synthetic/ring_stripes"], "unknown subject");
+    quick(args!["synthetic/nobody"])
+        .refuses(&["subject `synthetic/nobody`", "synthetic/ring_stripes"], "unknown subject");
     quick(args!["nowhere/ava"]).refuses(&["nowhere", "synthetic"], "unknown data set");
     quick(args!["--avatar", "missing.ply"]).refuses(&["missing.ply"], "no such avatar");
     desk.put("bad.ply", "ply\nnonsense");
@@ -258,6 +259,6 @@ fn bad_input_is_one_line() {
 /// A body whose face indices are beyond those of any built-in subject.
 fn many_faces() -> RestBody {
     let body = rig::body();
-    let faces = body.faces.iter().cycle().take(3_000_000).copied().collect();
+    let faces = body.faces.iter().cycle().take(300_000).copied().collect();
     RestBody { faces, ..body }
 }

@@ -15,9 +15,9 @@ use std::path::PathBuf;
 /// The subject that is measured unless another is named.
 const DEFAULT_SUBJECT: &str = "synthetic/ring_stripes";
 
-/// Measure speed against accuracy: solvers, influences, precision, colour, storage, splats, cut-offs, resolution.
+/// Measure what every choice costs and how far it is from the exact answer.
 ///
-/// Everything is measured in one run on one avatar, in the subject's test motion and in one whose joints are turned by
+/// Solvers, influences, precision, strategies, colour, storage, splats, cut-offs, resolution, many avatars: everything is measured in one run on one avatar, in the subject's test motion and in one whose joints are turned by
 /// nearly 180 degrees. Writes trade.md, trade.csv, trade.json and a plot of time against error per table and motion, and
 /// ends with a recommendation for offline scoring, real-time engines and browsers. Times are of one thread: run it on an
 /// idle machine. Everything but times is the same from run to run.

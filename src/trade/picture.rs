@@ -16,14 +16,15 @@ pub fn scatter(sweep: &Sweep, motion: &str) -> Option<Scatter> {
         .into_iter()
         .filter_map(|(row, x, outcome)| {
             let y = if by_angle {
-                outcome.degrees?.p95.max(EQUAL_BELOW)
+                outcome.degrees?.p95
             } else {
                 10.0_f64.powf(-outcome.fidelity?.decibels().min(EQUAL_BEYOND) / 20.0)
             };
             Some(Point { label: row.name(), x, y, on_front: false })
         })
         .collect();
-    let front = pareto_front(&points.iter().map(|p| [p.x, p.y]).collect::<Vec<_>>());
+    let least = if by_angle { EQUAL_BELOW } else { 0.0 };
+    let front = pareto_front(&points.iter().map(|p| [p.x, p.y.max(least)]).collect::<Vec<_>>());
     points.iter_mut().zip(front).for_each(|(point, on_front)| point.on_front = on_front);
     (!points.is_empty()).then(|| Scatter {
         title: format!("{}, {motion} motion", sweep.title),

@@ -4,8 +4,20 @@ use crate::args;
 use crate::program::Desk;
 use std::process::{Command, Stdio};
 
-const SUBCOMMANDS: [&str; 11] =
-    ["run", "plan", "report", "list", "fit", "render", "skin", "score", "blend", "inspect", "completions"];
+const SUBCOMMANDS: [&str; 12] = [
+    "run",
+    "plan",
+    "report",
+    "list",
+    "fit",
+    "render",
+    "skin",
+    "score",
+    "blend",
+    "trade",
+    "inspect",
+    "completions",
+];
 
 #[test]
 fn top_level_help() {
@@ -25,6 +37,7 @@ fn top_level_help() {
       score        Score renders against truth: two images, or two folders whose frames pair up by name
       blend        Blend rotations with every solver: check a shader or an engine against the exact
                    answer
+      trade        Measure what every choice costs and how far it is from the exact answer
       inspect      Show what a file or folder holds, and what is wrong with it
       completions  Print a completion script for a shell
       help         Print this message or the help of the given subcommand(s)

@@ -70,7 +70,7 @@ pub(super) fn cutoffs(bench: &Bench) -> Result<Sweep, Error> {
         id: "cutoffs",
         title: "Cut-offs of the renderer",
         about: "A plain f64 renderer with each cut-off alone, on exact rotations of the test motion, against the image without \
-                any: what a cut-off saves there is the work that it leaves out, not what a tuned rasterizer would save."
+                any (3 sigma ends splats at whole tiles, alpha and none at the pixel): what a cut-off saves there is the work that it leaves out, not what a tuned rasterizer would save."
             .to_owned(),
         axes: vec!["Cut-off"],
         unit: Unit::PerFrame,

@@ -172,7 +172,7 @@ fn decoding(bench: &Bench, parts: &[Part]) -> crate::trade::Spread {
 }
 
 /// Shares of the Gaussians that are kept, per cent.
-const KEPT: [usize; 6] = [100, 90, 75, 50, 25, 10];
+const KEPT: [usize; 5] = [90, 75, 50, 25, 10];
 
 /// Fewer splats, the least opaque or those that add least to the training images left out.
 pub(super) fn splats(bench: &Bench) -> Result<Sweep, Error> {
@@ -185,38 +185,38 @@ pub(super) fn splats(bench: &Bench) -> Result<Sweep, Error> {
     let flat = spread[1] - spread[0] < 1e-6;
     let contributions = contributions(bench)?;
     let mut rows = Vec::new();
-    for (by, ranks) in [("contribution", &contributions), ("opacity", &opacities)] {
-        for share in KEPT {
-            let choice = vec![by.to_owned(), format!("{share} %")];
-            if by == "opacity" && flat && share < 100 {
-                for motion in &stage.motions {
-                    let problem = "all opacities are equal: nothing to rank by".to_owned();
-                    let (choice, note) = (choice.clone(), String::new());
-                    rows.push(SweepRow { motion: motion.id, choice, outcome: Err(problem), note });
-                }
-                continue;
+    let rankings = [("contribution", &contributions), ("opacity", &opacities)];
+    let pruned = rankings.iter().flat_map(|&(by, ranks)| KEPT.map(|share| (by, ranks, share)));
+    for (by, ranks, share) in std::iter::once(("all", &opacities, 100)).chain(pruned) {
+        let choice = vec![by.to_owned(), format!("{share} %")];
+        if by == "opacity" && flat {
+            for motion in &stage.motions {
+                let problem = "all opacities are equal: nothing to rank by".to_owned();
+                let (choice, note) = (choice.clone(), String::new());
+                rows.push(SweepRow { motion: motion.id, choice, outcome: Err(problem), note });
             }
-            let mut order: Vec<usize> = (0..n).collect();
-            order.sort_by(|&a, &b| ranks[b].total_cmp(&ranks[a]).then(a.cmp(&b)));
-            order.truncate((n * share).div_ceil(100).max(1));
-            order.sort_unstable();
-            let bound = BoundAvatar::new(&subset(&stage.avatar, &order, joints)?, &stage.rig.body)?;
-            for (m, motion) in stage.motions.iter().enumerate() {
-                let mut images = Vec::new();
-                for shot in &motion.shots {
-                    let body = PosedBody::new(&stage.rig.body, &shot.pose)?;
-                    let posed = pose(&bound, &body, &stock())?;
-                    images.push(crate::render::splat::render(&posed, &shot.camera, &stage.settings).image);
-                }
-                let time = bench.frame_time(&bound, &stock(), &motion.shots[0])?;
-                let fidelity = Some(bench.fidelity(m, &images)?);
-                rows.push(SweepRow {
-                    motion: motion.id,
-                    choice: choice.clone(),
-                    outcome: Ok(Outcome { time: Some(time), fidelity, ..Outcome::default() }),
-                    note: format!("{} Gaussians", order.len()),
-                });
+            continue;
+        }
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&a, &b| ranks[b].total_cmp(&ranks[a]).then(a.cmp(&b)));
+        order.truncate((n * share).div_ceil(100).max(1));
+        order.sort_unstable();
+        let bound = BoundAvatar::new(&subset(&stage.avatar, &order, joints)?, &stage.rig.body)?;
+        for (m, motion) in stage.motions.iter().enumerate() {
+            let mut images = Vec::new();
+            for shot in &motion.shots {
+                let body = PosedBody::new(&stage.rig.body, &shot.pose)?;
+                let posed = pose(&bound, &body, &stock())?;
+                images.push(crate::render::splat::render(&posed, &shot.camera, &stage.settings).image);
             }
+            let time = bench.frame_time(&bound, &stock(), &motion.shots[0])?;
+            let fidelity = Some(bench.fidelity(m, &images)?);
+            rows.push(SweepRow {
+                motion: motion.id,
+                choice: choice.clone(),
+                outcome: Ok(Outcome { time: Some(time), fidelity, ..Outcome::default() }),
+                note: format!("{} Gaussians", order.len()),
+            });
         }
     }
     Ok(Sweep {
