@@ -86,6 +86,17 @@ impl Auto {
         rounding::STORED.to_degrees()
     }
 
+    /// A tolerance from text.
+    ///
+    /// # Errors
+    /// What was expected: a number that is not too small for any pose.
+    pub fn parse_tolerance(text: &str) -> Result<f64, String> {
+        let usable = |degrees: &f64| degrees.is_finite() && *degrees >= Self::smallest();
+        text.parse().ok().filter(usable).ok_or_else(|| {
+            format!("a tolerance in degrees such as 0.5, finite and at least {:.2e}", Self::smallest())
+        })
+    }
+
     fn resolve(
         &self,
         bound: &BoundAvatar,
@@ -133,11 +144,7 @@ impl FromStr for Choice {
             let part = format!("{NAME}{number}");
             StrategyError::BadVariation { part, expected: expected.to_owned() }
         };
-        let tolerance: f64 = number.parse().map_err(|_| bad("auto:DEGREES, such as auto:0.5"))?;
-        if !tolerance.is_finite() || tolerance < Auto::smallest() {
-            let expected = format!("a tolerance in degrees, finite and at least {:.2e}", Auto::smallest());
-            return Err(bad(&expected));
-        }
+        let tolerance = Auto::parse_tolerance(number).map_err(|expected| bad(&expected))?;
         let parts: Vec<&str> = variations.map(|v| v.split('+').collect()).unwrap_or_default();
         let asks = |axis: &str| parts.iter().find(|part| part.split('=').next() == Some(axis));
         if let Some(part) = asks("rotation") {
@@ -208,7 +215,7 @@ mod tests {
             assert!(message.contains(&smallest), "{spec}: {message}");
         }
         for (spec, known) in
-            [("auto:", "0.5"), ("auto:x", "auto:DEGREES"), ("auto:1+rotation=nlerp", "auto picks")]
+            [("auto:", "0.5"), ("auto:x", "degrees"), ("auto:1+rotation=nlerp", "auto picks")]
         {
             let message = spec.parse::<Choice>().unwrap_err().to_string();
             assert!(message.contains(known), "{spec}: {message}");
