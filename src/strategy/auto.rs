@@ -48,18 +48,18 @@ pub struct Resolved {
     pub bound: Option<f64>,
 }
 
-/// What [`Auto`] chooses from, cheapest first, with what posing a Gaussian costs in nanoseconds: `cargo bench --bench
-/// posing -- candidates` on one core, SH degree 0, 100,000 Gaussians on one to four bones. An order, not a clock: the choice depends on
-/// avatar, pose and tolerance alone. Every other solver and projection of this program costs more than the exact closed
-/// form, which works on eight Gaussians at a time.
+/// What [`Auto`] chooses from, cheapest first, with nanoseconds per Gaussian by which they are ordered. The exact average's
+/// is measured (one core, SH degree 0, 100,000 Gaussians); the two before it are estimates from the operations that they
+/// leave out of the same vector code, to be replaced by those of `cargo bench --bench posing -- candidates`. An order, not
+/// a clock: the choice depends on avatar, pose and tolerance alone.
 pub const CANDIDATES: [(RotationChoice, f64); 3] = [
     (RotationChoice::QuaternionAverage(Solver::Power { steps: 0, start: Start::Heaviest }), 13.0),
     (RotationChoice::QuaternionAverage(Solver::Nlerp), 16.0),
     (RotationChoice::QuaternionAverage(Solver::ClosedForm), 20.0),
 ];
 
-/// Views of one pose up to which turning the view direction costs less than rotating SH of a degree: 0.6 nanoseconds per
-/// Gaussian and view against 12, 37 and 98 per Gaussian.
+/// Views of one pose up to which the view direction is turned in place of SH of a degree. Rotating degree 3 costs about 100
+/// nanoseconds per Gaussian and pose; the other costs are estimates: turning a direction is nine multiplications a view.
 const VIEWS_WORTH: [usize; 4] = [0, 8, 16, 32];
 
 impl Choice {
