@@ -81,7 +81,7 @@ fn show(outcome: &Outcome) -> String {
 #[serde(rename_all = "kebab-case")]
 enum Line {
     Header(Header),
-    Frame(FrameRecord),
+    Frame(Box<FrameRecord>),
 }
 
 /// Says what follows. Fields that a newer program adds do not keep this one from reading the schema number.
@@ -153,7 +153,7 @@ impl Store {
             let at = || [self.path.display().to_string(), "this run".to_owned()];
             insert(&mut touched, record.clone()).map_err(|clash| clash.at(at()))?;
         }
-        let lines: Vec<Line> = records.iter().cloned().map(Line::Frame).collect();
+        let lines: Vec<Line> = records.iter().cloned().map(|record| Line::Frame(Box::new(record))).collect();
         self.write(&lines)?;
         self.records.append(&mut touched);
         Ok(())
@@ -303,7 +303,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Contents, Error> {
             Line::Frame(record) => {
                 let at = |line: usize| format!("{}:{line}", path.display());
                 let (key, scored) = (record.key.clone(), matches!(record.outcome, Outcome::Scored { .. }));
-                insert(&mut contents.records, record).map_err(|clash| {
+                insert(&mut contents.records, *record).map_err(|clash| {
                     clash.at([at(scored_in.get(&key).copied().unwrap_or_default()), at(number)])
                 })?;
                 if scored {

@@ -48,18 +48,18 @@ pub struct Resolved {
     pub bound: Option<f64>,
 }
 
-/// What [`Auto`] chooses from, cheapest first, with what posing a Gaussian costs in nanoseconds: `cargo bench --bench
-/// posing -- candidates` on one core, SH degree 0, 100,000 Gaussians on one to four bones. An order, not a clock: the choice depends on
-/// avatar, pose and tolerance alone. Every other solver and projection of this program costs more than the exact closed
-/// form, which works on eight Gaussians at a time.
+/// What [`Auto`] chooses from, cheapest first, with nanoseconds per Gaussian by which they are ordered. The exact average's
+/// is measured (one core, SH degree 0, 100,000 Gaussians); the two before it are estimates from the operations that they
+/// leave out of the same vector code, to be replaced by those of `cargo bench --bench posing -- candidates`. An order, not
+/// a clock: the choice depends on avatar, pose and tolerance alone.
 pub const CANDIDATES: [(RotationChoice, f64); 3] = [
     (RotationChoice::QuaternionAverage(Solver::Power { steps: 0, start: Start::Heaviest }), 13.0),
     (RotationChoice::QuaternionAverage(Solver::Nlerp), 16.0),
     (RotationChoice::QuaternionAverage(Solver::ClosedForm), 20.0),
 ];
 
-/// Views of one pose up to which turning the view direction costs less than rotating SH of a degree: 0.6 nanoseconds per
-/// Gaussian and view against 12, 37 and 98 per Gaussian.
+/// Views of one pose up to which the view direction is turned in place of SH of a degree. Rotating degree 3 costs about 100
+/// nanoseconds per Gaussian and pose; the other costs are estimates: turning a direction is nine multiplications a view.
 const VIEWS_WORTH: [usize; 4] = [0, 8, 16, 32];
 
 impl Choice {
@@ -84,6 +84,17 @@ impl Auto {
     /// The smallest tolerance that any pose can keep, degrees: what `f32` leaves of one bone.
     pub fn smallest() -> f64 {
         rounding::STORED.to_degrees()
+    }
+
+    /// A tolerance from text.
+    ///
+    /// # Errors
+    /// What was expected: a number that is not too small for any pose.
+    pub fn parse_tolerance(text: &str) -> Result<f64, String> {
+        let usable = |degrees: &f64| degrees.is_finite() && *degrees >= Self::smallest();
+        text.parse().ok().filter(usable).ok_or_else(|| {
+            format!("a tolerance in degrees such as 0.5, finite and at least {:.2e}", Self::smallest())
+        })
     }
 
     fn resolve(
@@ -133,11 +144,7 @@ impl FromStr for Choice {
             let part = format!("{NAME}{number}");
             StrategyError::BadVariation { part, expected: expected.to_owned() }
         };
-        let tolerance: f64 = number.parse().map_err(|_| bad("auto:DEGREES, such as auto:0.5"))?;
-        if !tolerance.is_finite() || tolerance < Auto::smallest() {
-            let expected = format!("a tolerance in degrees, finite and at least {:.2e}", Auto::smallest());
-            return Err(bad(&expected));
-        }
+        let tolerance = Auto::parse_tolerance(number).map_err(|expected| bad(&expected))?;
         let parts: Vec<&str> = variations.map(|v| v.split('+').collect()).unwrap_or_default();
         let asks = |axis: &str| parts.iter().find(|part| part.split('=').next() == Some(axis));
         if let Some(part) = asks("rotation") {
@@ -208,7 +215,7 @@ mod tests {
             assert!(message.contains(&smallest), "{spec}: {message}");
         }
         for (spec, known) in
-            [("auto:", "0.5"), ("auto:x", "auto:DEGREES"), ("auto:1+rotation=nlerp", "auto picks")]
+            [("auto:", "0.5"), ("auto:x", "degrees"), ("auto:1+rotation=nlerp", "auto picks")]
         {
             let message = spec.parse::<Choice>().unwrap_err().to_string();
             assert!(message.contains(known), "{spec}: {message}");

@@ -5,7 +5,7 @@ use super::line;
 use crate::data::{body, ply, poses};
 use crate::scene::{Binding, Body, Pose, RestBody};
 use crate::strategy::needs::{Degrees, Extreme, Needs};
-use crate::strategy::{BoundAvatar, RotationChoice};
+use crate::strategy::{Auto, BoundAvatar, RotationChoice};
 use anyhow::{Context as _, Result, bail};
 use std::path::{Path, PathBuf};
 
@@ -40,11 +40,7 @@ pub(super) struct Motion {
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {
-    let choice: crate::strategy::Choice = format!("auto:{text}").parse().map_err(|e| format!("{e}"))?;
-    match choice {
-        crate::strategy::Choice::Auto(auto) => Ok(auto.tolerance),
-        crate::strategy::Choice::Fixed(_) => Err("expected a number of degrees".to_owned()),
-    }
+    Auto::parse_tolerance(text).map_err(|expected| format!("expected {expected}"))
 }
 
 impl Motion {
