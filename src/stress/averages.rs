@@ -152,7 +152,11 @@ fn line<T: Real>(precision: &'static str, method: Method, family: &Family, quick
         }
         match (verdict, sound) {
             (Verdict::Breaks, Some(before)) if line.threshold.is_none() => {
-                line.threshold = threshold::<T>(precision, method, family, before, x);
+                line.threshold = threshold::<T>(method, family, before, x);
+            }
+            // Broken from the easiest input on.
+            (Verdict::Breaks, None) if line.rows.len() == 1 => {
+                line.threshold = Some(Threshold::new::<T>(method, family, x));
             }
             (Verdict::Breaks, _) => {}
             _ => sound = Some(x),
@@ -161,27 +165,27 @@ fn line<T: Real>(precision: &'static str, method: Method, family: &Family, quick
     line
 }
 
-fn threshold<T: Real>(
-    precision: &'static str,
-    method: Method,
-    family: &Family,
-    sound: f64,
-    broken: f64,
-) -> Option<Threshold> {
+fn threshold<T: Real>(method: Method, family: &Family, sound: f64, broken: f64) -> Option<Threshold> {
     let breaks = |x: f64| {
         Posed::<T>::new(&family.problem(x))
             .and_then(|posed| measure(&posed, method.answer(&posed.quats, &posed.weights)))
             .is_none_or(|measured| measured.verdict == Verdict::Breaks)
     };
     let breaks_at = if family.continuous { bisect(sound, broken, breaks) } else { broken };
-    Some(Threshold {
-        section: SECTION,
-        family: family.id.to_owned(),
-        subject: method.to_string(),
-        precision,
-        breaks_at,
-        axis: family.axis.to_owned(),
-    })
+    Some(Threshold::new::<T>(method, family, breaks_at))
+}
+
+impl Threshold {
+    fn new<T: Real>(method: Method, family: &Family, breaks_at: f64) -> Self {
+        Self {
+            section: SECTION,
+            family: family.id.to_owned(),
+            subject: method.to_string(),
+            precision: if T::EPSILON.to_f64() < 1e-10 { "f64" } else { "f32" },
+            breaks_at,
+            axis: family.axis.to_owned(),
+        }
+    }
 }
 
 /// Degrees by which an answer changes where it should not.

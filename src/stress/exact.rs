@@ -131,13 +131,13 @@ mod tests {
                     let basis = case["top_eigenspace_basis_wxyz"].as_array().unwrap();
                     assert_eq!(exact.dimensions, basis.len(), "{name}");
                     for axis in basis {
-                        assert!(exact.error_degrees(quaternion(axis)) < 1e-13, "{name}");
+                        assert!(exact.error_degrees(quaternion(axis)) < 2e-13, "{name}");
                     }
                 } else {
                     seen[0] += 1;
                     let answer = quaternion(&case["markley_wxyz"]);
-                    // Seventeen digits are 1e-16, twice that as an angle.
-                    assert!(exact.error_degrees(answer) < 5e-14, "{name}: {}", exact.error_degrees(answer));
+                    // Seventeen digits and the projector in f64: some 1e-16 per component, twice that as an angle.
+                    assert!(exact.error_degrees(answer) < 2e-13, "{name}: {}", exact.error_degrees(answer));
                     assert!(exact.loss(answer) < 1e-15, "{name}: {}", exact.loss(answer));
                     assert_eq!(exact.dimensions, 1, "{name}");
                 }

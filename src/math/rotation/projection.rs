@@ -90,8 +90,23 @@ fn unique_polar<T: Real>(m: Matrix3<T>) -> Option<Quaternion<T>> {
     proper_polar_factor(m.map(|row| row.map(|c| c / scale))).map(matrix_to_quaternion)
 }
 
+/// The rotation nearest to a matrix that was rounded to `f32`, computed in `f64`; `None` where that rounding leaves it open.
+pub(crate) fn unique_polar_of_rounded(m: Matrix3<f32>) -> Option<Quaternion<f64>> {
+    let scale = matrix3::max_abs(m);
+    if !matrix3::is_finite(m) || scale == 0.0 {
+        return None;
+    }
+    let m = m.map(|row| row.map(|c| f64::from(c) / f64::from(scale)));
+    polar_factor(m, f64::from(f32::EPSILON)).map(matrix_to_quaternion)
+}
+
 /// `U diag(1, 1, det(U Vᵀ)) Vᵀ`, or `None` where it is not unique. The entries of `m` are of moderate size and not all zero.
 pub(crate) fn proper_polar_factor<T: Real>(m: Matrix3<T>) -> Option<Matrix3<T>> {
+    polar_factor(m, T::EPSILON)
+}
+
+/// [`proper_polar_factor`] of a matrix whose entries are off by about `rounding` of the largest.
+fn polar_factor<T: Real>(m: Matrix3<T>, rounding: T) -> Option<Matrix3<T>> {
     let (mut us, mut v) = one_sided_jacobi(matrix3::transpose(m));
     let squared = us.map(|u| matrix3::dot(u, u));
     let mut order = [0, 1, 2];
@@ -105,7 +120,7 @@ pub(crate) fn proper_polar_factor<T: Real>(m: Matrix3<T>) -> Option<Matrix3<T>> 
     let [u1, u2] = [us[0].map(|c| c / s1), us[1].map(|c| c / s2)];
     let (u3, v3) = (matrix3::cross(u1, u2), matrix3::cross(v[0], v[1]));
     let signed_s3 = matrix3::dot(u3, matrix3::apply(m, v3));
-    is_distinct(s2 + signed_s3, s1)
+    (s2 + signed_s3 > T::from_f64(16.0) * rounding * s1)
         .then(|| matrix3::multiply(matrix3::transpose([u1, u2, u3]), [v[0], v[1], v3]))
 }
 

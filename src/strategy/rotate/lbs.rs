@@ -100,6 +100,6 @@ fn sum(a: Quaternion<f32>, b: Quaternion<f32>) -> Quaternion<f32> {
 
 /// The rotation nearest to B, computed in `f64`; where several are equally near, the quaternion average's choice.
 fn nearest(input: &BlockInput<'_>, lane: usize) -> Quaternion<f32> {
-    let b = input.blend.matrix(lane).map(|row| row.map(f64::from));
-    rotation::polar(b).map_or_else(|| input.average_of(lane), |q| q.map(|c| c as f32))
+    rotation::unique_polar_of_rounded(input.blend.matrix(lane))
+        .map_or_else(|| input.average_of(lane), |q| q.map(|c| c as f32))
 }
