@@ -22,7 +22,7 @@ pub struct CodeVersions {
 
 impl CodeVersions {
     /// The versions of this build.
-    pub const CURRENT: Self = Self { fit: 2, strategy: 1, render: 1, metrics: 2 };
+    pub const CURRENT: Self = Self { fit: 3, strategy: 2, render: 2, metrics: 2 };
 }
 
 /// The value as JSON text that depends on nothing but the value: object keys sorted by their bytes, no white space,
