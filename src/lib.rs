@@ -31,7 +31,6 @@ pub mod metrics;
 pub mod render;
 pub mod report;
 pub mod run;
-pub mod savings;
 pub mod scene;
 pub mod strategy;
 pub mod stress;

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 /// Module, layer, and same-layer modules that it may import all the same.
-const LAYERS: [(&str, u8, &[&str]); 14] = [
+const LAYERS: [(&str, u8, &[&str]); 13] = [
     ("math", 0, &[]),
     ("scene", 1, &[]),
     ("strategy", 2, &[]),
@@ -16,7 +16,6 @@ const LAYERS: [(&str, u8, &[&str]); 14] = [
     ("run", 5, &["fit"]),
     ("report", 5, &["run"]),
     ("trade", 5, &["run", "fit", "report"]),
-    ("savings", 5, &["fit"]),
     ("stress", 5, &[]),
     ("cli", 6, &[]),
 ];

@@ -7,9 +7,9 @@ mod rig;
 use glam::DVec3;
 use proptest::prelude::{ProptestConfig, any, prop_assert, prop_assert_eq, proptest};
 use skinsplat::render::splat::{RenderSettings, Renderer};
-use skinsplat::savings::{Options, Same, measure};
 use skinsplat::scene::{Camera, PosedBody};
 use skinsplat::strategy::{BoundAvatar, PoseBuffers, Strategy, pose, pose_seen};
+use skinsplat::trade::savings::{Options, Same, measure};
 
 #[test]
 fn every_saving_keeps_what_it_claims() {
@@ -18,7 +18,7 @@ fn every_saving_keeps_what_it_claims() {
     assert!(savings.len() >= 8);
     for saving in &savings {
         assert!(!matches!(saving.result, Same::Different { .. }), "{}: {}", saving.what, saving.result);
-        assert!(saving.without.least > 0.0 && saving.with.least > 0.0, "{}", saving.what);
+        assert!(saving.without.low > 0.0 && saving.with.low > 0.0, "{}", saving.what);
     }
     let identical = savings.iter().filter(|saving| saving.result == Same::Identical).count();
     assert_eq!(identical, 5, "{savings:#?}");

@@ -56,6 +56,27 @@ pub(super) fn time<T>(repeats: usize, mut work: impl FnMut() -> T) -> Spread {
     Spread::of(&times)
 }
 
+/// Times two ways of doing something, one after the other `repeats` times (at least once), after one turn each that is not
+/// counted.
+pub(super) fn in_turns<E>(
+    repeats: usize,
+    mut one: impl FnMut() -> Result<(), E>,
+    mut other: impl FnMut() -> Result<(), E>,
+) -> Result<[Spread; 2], E> {
+    let mut seconds = [Vec::new(), Vec::new()];
+    let timed = |times: &mut Vec<f64>, work: &mut dyn FnMut() -> Result<(), E>| {
+        let start = Instant::now();
+        work()?;
+        times.push(start.elapsed().as_secs_f64().max(1e-9));
+        Ok(())
+    };
+    for _ in 0..=repeats.max(1) {
+        timed(&mut seconds[0], &mut one)?;
+        timed(&mut seconds[1], &mut other)?;
+    }
+    Ok(seconds.map(|times| Spread::of(&times[1..])))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

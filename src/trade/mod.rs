@@ -18,6 +18,7 @@ mod pareto;
 mod picture;
 mod recommend;
 mod reference;
+pub mod savings;
 mod section;
 mod stage;
 mod sweep;

@@ -4,13 +4,14 @@
 //! [`measure`] runs each pair on a subject that is built in: an avatar made from a few of its training frames, its test
 //! motion, its camera. Times are of one thread and differ from run to run; everything else does not.
 
-mod clock;
 mod rows;
 mod scene;
+mod section;
 
-pub use clock::Timing;
 pub use scene::Options;
+pub use section::{ID, section};
 
+use super::Spread;
 use crate::{data, fit, scene as world, strategy};
 use serde::Serialize;
 
@@ -22,9 +23,9 @@ pub struct Saving {
     /// What one unit of the times is: a frame, a pose, a Gaussian-free step.
     pub unit: &'static str,
     /// The cost of doing it all.
-    pub without: Timing,
+    pub without: Spread,
     /// The cost of doing what is needed.
-    pub with: Timing,
+    pub with: Spread,
     /// What became of the result.
     pub result: Same,
 }
@@ -32,7 +33,7 @@ pub struct Saving {
 impl Saving {
     /// How many times faster.
     pub fn factor(&self) -> f64 {
-        self.without.least / self.with.least
+        self.without.median / self.with.median
     }
 }
 

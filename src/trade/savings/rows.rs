@@ -1,6 +1,6 @@
 //! One function per saving.
 
-use super::clock::in_turns;
+use super::super::clock::in_turns;
 use super::scene::{Options, Scene};
 use super::{Error, Same, Saving};
 use crate::math::rotation::angle_between;
@@ -100,10 +100,10 @@ impl<'a> Bench<'a> {
         let (mut first, mut second) = (PoseBuffers::default(), PoseBuffers::default());
         let [without, with] = in_turns(
             self.options.runs,
-            self.bodies.len(),
             || self.bodies.iter().try_for_each(|body| without(body, &mut first)),
             || self.bodies.iter().try_for_each(|body| with(body, &mut second)),
         )?;
+        let [without, with] = [without, with].map(|time| time.per(self.bodies.len()));
         Ok(Saving { what, unit: "pose", without, with, result })
     }
 
@@ -148,10 +148,10 @@ impl<'a> Bench<'a> {
         }
         let [without, with] = in_turns(
             self.options.runs,
-            self.bodies.len(),
             || self.poses().try_for_each(|pose| PosedBody::new(body, pose).map(|body| drop(black_box(body)))),
             || self.poses().try_for_each(|pose| some(pose).map(|body| drop(black_box(body)))),
         )?;
+        let [without, with] = [without, with].map(|time| time.per(self.bodies.len()));
         let (unread, all) = (read.iter().filter(|read| !**read).count(), read.len());
         let what = format!("no polar decomposition for the {unread} of {all} joints that no Gaussian reads");
         Ok(Saving { what, unit: "pose", without, with, result: identical(f64::NAN, same, "posed Gaussians") })
@@ -265,7 +265,8 @@ impl<'a> Bench<'a> {
                 .zip(cameras)
                 .try_for_each(|(body, camera)| way.image(body, camera).map(|i| drop(black_box(i))))
         };
-        let [without, with] = in_turns(self.options.runs, self.bodies.len(), || run(a), || run(b))?;
+        let [without, with] =
+            in_turns(self.options.runs, || run(a), || run(b))?.map(|time| time.per(self.bodies.len()));
         let result = match allowed {
             None => identical(largest, same, "colour"),
             Some(allowed) => compared(largest, allowed, "colour"),
@@ -280,7 +281,6 @@ impl<'a> Bench<'a> {
         let after = test.selected(&[wanted])?.truth(0)?;
         let some: &[usize] = &self.scene.frames;
         let [without, with] = in_turns(
-            1,
             1,
             || some.iter().try_for_each(|&frame| test.truth(frame).map(|truth| drop(black_box(truth)))),
             || test.truth(wanted).map(|truth| drop(black_box(truth))),
