@@ -58,8 +58,8 @@ enum Command {
     Score(score::Score),
     Blend(blend::Blend),
     Trade(trade::Trading),
-    Inspect(inspect::Inspect),
     Stress(stress::Stress),
+    Inspect(inspect::Inspect),
     Completions(completions::Completions),
 }
 
@@ -133,8 +133,8 @@ impl Command {
             Self::Score(command) => command.run(context),
             Self::Blend(command) => command.run(),
             Self::Trade(command) => command.run(context),
-            Self::Inspect(command) => command.run(),
             Self::Stress(command) => command.run(context),
+            Self::Inspect(command) => command.run(),
             Self::Completions(command) => command.run(),
         }
     }

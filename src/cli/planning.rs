@@ -20,7 +20,7 @@ pub(super) struct Planning {
     /// Most iterations of a fit [default: the profile's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     fit_iterations: Option<u32>,
-    /// Repeat every fit with these seeds, and print means and spreads: --seeds 0,1,2 [default: the experiment's]
+    /// Repeat every fit with these seeds (such as 0,1,2), and print means and spreads
     #[arg(long, value_name = "S,…", value_delimiter = ',')]
     seeds: Vec<u64>,
     /// Add a row for every strategy

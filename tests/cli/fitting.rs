@@ -65,7 +65,7 @@ fn a_hybrid_leaves_its_mesh_beside_its_gaussians() {
     ];
     let sidecar: Value = serde_json::from_str(&desk.ok(fit.clone())).unwrap();
     assert_eq!(sidecar["options"]["recipe"]["mesh"]["texture"], 64);
-    assert_eq!(sidecar["held_out"].as_array().unwrap().len(), 4);
+    assert_eq!(sidecar["held_out"].as_array().unwrap().len(), 6);
     let parts = ["ava.ply", "ava.texture.png", "ava.vertices.npy", "ava.json"];
     let first = parts.map(|name| desk.bytes(name));
     desk.ok([args!["--threads", "1"], fit].concat());

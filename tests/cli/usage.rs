@@ -4,7 +4,7 @@ use crate::args;
 use crate::program::Desk;
 use std::process::{Command, Stdio};
 
-const SUBCOMMANDS: [&str; 12] = [
+const SUBCOMMANDS: [&str; 13] = [
     "run",
     "plan",
     "report",
@@ -15,6 +15,7 @@ const SUBCOMMANDS: [&str; 12] = [
     "score",
     "blend",
     "trade",
+    "stress",
     "inspect",
     "completions",
 ];
@@ -38,6 +39,8 @@ fn top_level_help() {
       blend        Blend rotations with every solver: check a shader or an engine against the exact
                    answer
       trade        Measure what every choice costs and how far it is from the exact answer
+      stress       Try every strategy and solver on inputs that are hard on purpose, and say what holds,
+                   degrades and breaks
       inspect      Show what a file or folder holds, and what is wrong with it
       completions  Print a completion script for a shell
       help         Print this message or the help of the given subcommand(s)

@@ -166,7 +166,7 @@ fn all_strategies_add_a_row_each_and_nothing_twice() {
     assert_eq!((added.sh_degree, added.paper.as_deref()), (Some(1), None));
     assert_eq!(extended.with_all_strategies(), extended);
     let mesh = Experiment::embedded()[5].with_all_strategies();
-    assert_eq!(mesh.variants[2].avatar, mesh.variants[1].avatar);
+    assert_eq!(mesh.variants[3].avatar, mesh.variants[2].avatar);
     for experiment in Experiment::embedded() {
         let text = toml::to_string(&experiment.with_all_strategies()).unwrap();
         Experiment::parse(&text, &format!("{}.toml", experiment.id)).unwrap();
