@@ -2,6 +2,7 @@
 
 use super::{Error, frames, reduce};
 use crate::scene::{Camera, Image, Mask, Pose, RestBody};
+use rayon::prelude::*;
 use std::fmt::Debug;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -73,7 +74,37 @@ pub struct Truth {
     pub alpha: Mask,
 }
 
+/// True images that were loaded before.
+#[derive(Debug)]
+struct Held(Vec<Truth>);
+
+impl FrameGenerator for Held {
+    fn truth(&self, frame: usize) -> Truth {
+        self.0[frame].clone()
+    }
+
+    fn key(&self) -> String {
+        format!("{} frames in memory", self.0.len())
+    }
+}
+
 impl Sequence {
+    /// The sequence with all its true images loaded, for those who look at them again and again.
+    ///
+    /// # Errors
+    /// As [`Sequence::truth`].
+    pub fn held(&self) -> Result<Self, Error> {
+        let frames = (0..self.frames.len()).into_par_iter();
+        let truths = frames.map(|frame| self.truth(frame)).collect::<Result<Vec<_>, Error>>()?;
+        let generator: Arc<dyn FrameGenerator> = Arc::new(Held(truths));
+        let held = |(index, frame): (usize, &FrameRef)| FrameRef {
+            source: FrameSource::Generated { generator: generator.clone(), frame: index },
+            ..frame.clone()
+        };
+        let frames = self.frames.iter().enumerate().map(held).collect();
+        Ok(Self { frames, stored_sizes: None, ..self.clone() })
+    }
+
     /// The sequence seen by cameras whose longer side is at most `longer_side` pixels; true images are reduced by area
     /// averages when they are loaded.
     pub fn reduced(&self, longer_side: u32) -> Self {

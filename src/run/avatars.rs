@@ -1,14 +1,14 @@
 //! Avatars that jobs need: built from training frames once, kept in the run's folder, read back bit for bit.
 
+use super::curve_frames::CurveFrames;
 use super::fitting::{self, FitEvent, FitFiles, Tests};
 use super::textured::TexturedFiles;
 use super::{Error, Event, Library};
 use crate::data::{Sequence, ply};
-use crate::experiment::{AvatarBuild, AvatarRecipe, Job, Plan, PlannedFit, evenly_spaced};
+use crate::experiment::{AvatarBuild, AvatarRecipe, PlannedFit};
 use crate::fit::surface::{BindTo, Placement, SurfaceInit, surface_init};
 use crate::fit::texture::{TextureInit, TexturedBody, gather_texture};
 use crate::strategy::BoundAvatar;
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// An avatar that is ready to be posed.
@@ -27,10 +27,10 @@ pub enum Prepared {
 ///
 /// # Errors
 /// Training frames that cannot be read or used, or a folder that cannot be written.
-pub fn prepare(
-    plan: &Plan,
+pub(super) fn prepare(
     build: &AvatarBuild,
     library: &Library,
+    curves: &mut CurveFrames<'_>,
     folder: &Path,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<Prepared, Error> {
@@ -42,7 +42,7 @@ pub fn prepare(
     if let Some(planned) = &build.fit
         && !file.is_file()
     {
-        let tests = tests(plan, build, library)?;
+        let tests = curves.of(build, library)?;
         fit(build, planned, &sequence, &tests, file.clone(), folder, watch)?;
     }
     if !file.is_file() {
@@ -84,24 +84,7 @@ fn fit(
 }
 
 /// Points of the curve of test scores, after the start.
-const CURVE_POINTS: u32 = 8;
-/// Frames per sequence behind a point: a curve needs fewer than a table.
-const CURVE_FRAMES: usize = 4;
-
-/// Some of the frames on which the plan scores what is drawn with an avatar.
-fn tests(plan: &Plan, build: &AvatarBuild, library: &Library) -> Result<Vec<Sequence>, Error> {
-    let draws = |job: &&Job| job.variants.iter().any(|variant| variant.avatar == build.key);
-    let mut scored: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
-    for job in plan.jobs.iter().filter(draws) {
-        scored.entry(&job.sequence).or_default().insert(job.frame);
-    }
-    let few = |(id, frames): (&str, BTreeSet<usize>)| {
-        let frames = evenly_spaced(&frames.into_iter().collect::<Vec<_>>(), Some(CURVE_FRAMES));
-        let sequence = library.sequence(&build.dataset, &build.subject, id)?.selected(&frames)?;
-        Ok(build.resolution.map_or(sequence.clone(), |side| sequence.reduced(side)))
-    };
-    scored.into_iter().map(few).collect()
-}
+const CURVE_POINTS: u32 = 5;
 
 /// The frames that an avatar is made from.
 fn training(build: &AvatarBuild, library: &Library) -> Result<Sequence, Error> {

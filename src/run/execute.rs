@@ -1,6 +1,7 @@
 //! Executing jobs: one frame at a time, its truth loaded once, every variant posed, rendered and scored against it.
 
 use super::avatars::{Prepared, prepare};
+use super::curve_frames::CurveFrames;
 use super::frame::{Drawn, Frame, background};
 use super::store::Store;
 use super::{Error, Library};
@@ -78,10 +79,11 @@ pub(super) fn prepare_avatars(
     watch(Event::Avatars(builds.len()));
     std::fs::create_dir_all(folder).map_err(|source| Error::Folder { path: folder.to_owned(), source })?;
     let mut avatars = Avatars::new();
+    let mut curves = CurveFrames::new(plan);
     for build in builds {
         avatars.insert(
             build.key.clone(),
-            prepare(plan, build, library, folder, watch).map_err(|error| error.to_string()),
+            prepare(build, library, &mut curves, folder, watch).map_err(|error| error.to_string()),
         );
         watch(Event::AvatarReady);
     }

@@ -4,19 +4,45 @@ use super::Error;
 use super::fitting::HeldOut;
 use super::frame::together;
 use crate::data::Sequence;
+use crate::fit::texture::TexturedBody;
 use crate::fit::train::Fitted;
 use crate::metrics::{self, Protocol};
 use crate::render::splat::{RenderSettings, Renderer};
-use crate::scene::PosedBody;
+use crate::scene::{PosedBody, RestBody};
 use crate::strategy::{BoundAvatar, PoseBuffers, Strategy, pose_seen};
 use rayon::prelude::*;
+use std::sync::Arc;
 
-/// Poses, renders and scores an avatar on every frame of a sequence, by the default protocol.
+/// Poses, renders and scores an avatar on every frame of some sequences, by the default protocol. Binding it costs more than
+/// drawing a few frames: sequences that share a body share the bound avatar.
 ///
 /// # Errors
-/// A frame that cannot be read or scored, an avatar that does not fit the sequence's body.
+/// A frame that cannot be read or scored, an avatar that does not fit the sequences' body.
 pub fn held_out<'a>(
     fitted: impl Into<Fitted<'a>>,
+    strategy: &Strategy,
+    sequences: &[Sequence],
+    iteration: u32,
+) -> Result<Vec<HeldOut>, Error> {
+    let fitted = fitted.into();
+    let mut bound: Option<(&Arc<RestBody>, BoundAvatar)> = None;
+    let mut scores = Vec::with_capacity(sequences.len());
+    for sequence in sequences {
+        let (_, bound) = match bound.take_if(|(body, _)| Arc::ptr_eq(body, &sequence.body)) {
+            Some(same) => bound.insert(same),
+            None => {
+                let fresh = BoundAvatar::new(fitted.avatar, &sequence.body)?.without_zero_bands();
+                bound.insert((&sequence.body, fresh))
+            }
+        };
+        scores.push(of_sequence(bound, fitted.mesh, strategy, sequence, iteration)?);
+    }
+    Ok(scores)
+}
+
+fn of_sequence(
+    bound: &BoundAvatar,
+    mesh: Option<&TexturedBody>,
     strategy: &Strategy,
     sequence: &Sequence,
     iteration: u32,
@@ -24,15 +50,13 @@ pub fn held_out<'a>(
     let protocol = Protocol::parse("default")?;
     let background = protocol.background_colour().unwrap_or([1.0; 3]);
     let settings = RenderSettings { background, antialiased: false };
-    let Fitted { avatar, mesh } = fitted.into();
-    let bound = BoundAvatar::new(avatar, &sequence.body)?.without_zero_bands();
     let read = bound.joints_read(strategy);
     let score = |renderer: &mut Renderer, index: usize| {
         let truth = sequence.truth(index)?;
         let frame = &sequence.frames[index];
         let (pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
         let body = PosedBody::with_rotations(&sequence.body, pose, |joint| read[joint])?;
-        let posed = pose_seen(&bound, &body, strategy, camera, &mut PoseBuffers::default())?;
+        let posed = pose_seen(bound, &body, strategy, camera, &mut PoseBuffers::default())?;
         let image = match mesh {
             None => renderer.render(&posed, camera, &settings).image,
             Some(mesh) => together(renderer, &posed, (mesh, pose), camera, &settings)?.image,

@@ -4,6 +4,7 @@
 //! remembers every record by its content key, [`gallery`] shows where the variants differ.
 
 pub mod avatars;
+mod curve_frames;
 pub mod curves;
 mod error;
 mod execute;
