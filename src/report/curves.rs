@@ -46,9 +46,10 @@ pub fn curve_plots(curves: &[Curve], experiments: &[Experiment]) -> Result<Vec<(
         }
         let label = variant.map_or(&curve.variant, |variant| replicate.map_or(&variant.label, |r| &r.label));
         let series = plots.entry((&curve.experiment, &curve.subject)).or_default();
-        let kinds: [(&str, fn(&CurvePoint) -> Option<f64>); 2] =
-            [("training", |point| point.training_psnr), ("test", |point| point.test_psnr)];
-        for (kind, value) in kinds {
+        for kind in ["training", "test"] {
+            let value = |point: &CurvePoint| {
+                if kind == "training" { point.training_psnr } else { point.test_psnr }
+            };
             let at = |point: &CurvePoint| {
                 Some([f64::from(point.iteration), value(point).filter(|v| v.is_finite())?])
             };
