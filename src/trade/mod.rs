@@ -2,7 +2,7 @@
 //!
 //! Everything is measured in one call on one [`Stage`]: an avatar, a body, a realistic motion and one whose joints are
 //! turned by nearly 180 degrees, where solvers separate. Every [`Sweep`] is data; [`Sweep::section`] makes the table of
-//! it, [`recommend`] reads the choices for three uses off the rows, by stated rules.
+//! it, [`recommend()`] reads the choices for three uses off the rows, by stated rules.
 //!
 //! All times are of one thread. They, and what is judged by them (the front, the recommendations), are the only things
 //! that differ from call to call: errors have the same bits for any number of threads.
