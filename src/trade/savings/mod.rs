@@ -11,8 +11,7 @@ mod section;
 pub use scene::Options;
 pub use section::{ID, section};
 
-use super::Spread;
-use crate::{data, fit, scene as world, strategy};
+use super::{Error, Spread};
 use serde::Serialize;
 
 /// One thing that is left out where it is not needed.
@@ -75,23 +74,6 @@ impl std::fmt::Display for Same {
             }
         }
     }
-}
-
-/// Why nothing could be measured.
-#[derive(Debug, thiserror::Error)]
-pub enum Error {
-    /// The built-in subject.
-    #[error(transparent)]
-    Scene(#[from] world::SceneError),
-    /// Its frames.
-    #[error(transparent)]
-    Data(#[from] data::Error),
-    /// Its avatar.
-    #[error(transparent)]
-    Fit(#[from] fit::Error),
-    /// Posing it.
-    #[error(transparent)]
-    Strategy(#[from] strategy::StrategyError),
 }
 
 /// Measures every saving, in the order of the road: body, pose, colour, image, frames. In under 40 seconds with the

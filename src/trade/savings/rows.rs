@@ -2,7 +2,7 @@
 
 use super::super::clock::in_turns;
 use super::scene::{Options, Scene};
-use super::{Error, Same, Saving};
+use super::{Same, Saving};
 use crate::math::rotation::angle_between;
 use crate::math::sh;
 use crate::render::splat::{RenderSettings, Renderer};
@@ -10,6 +10,7 @@ use crate::scene::{Avatar, Camera, Image, Pose, Posed, PosedBody, RestBody};
 use crate::strategy::{
     BoundAvatar, Choice, PoseBuffers, Strategy, StrategyError, Views, pose_into, pose_seen,
 };
+use crate::trade::Error;
 use std::hint::black_box;
 
 /// Largest difference of a colour value between the two ways of turning SH: rounding of `f32` only.

@@ -1,11 +1,11 @@
 //! What is measured on.
 
-use super::Error;
 use crate::data::Sequence;
 use crate::data::synthetic::{self, SUBJECTS};
 use crate::fit::surface::{SurfaceInit, surface_init};
 use crate::math::sh;
 use crate::scene::{Avatar, Camera, SceneError};
+use crate::trade::Error;
 
 /// How much is measured.
 #[derive(Clone, Debug, PartialEq)]
