@@ -48,12 +48,12 @@ fn every_recipe_improves_on_its_start_on_held_out_poses() {
         let strategy = recipe.strategy.parse().unwrap();
         let first = start(&training, &options).unwrap();
         let mut trainer = Trainer::new(&training, &options, first.clone()).unwrap();
-        let before = held_out(trainer.fitted(), &strategy, &test, 0).unwrap().remove(0);
+        let before = held_out(trainer.fitted(), &strategy, &test, 0, true).unwrap().remove(0);
         while !trainer.is_done() {
             trainer.step().unwrap();
         }
         let avatar = trainer.avatar();
-        let after = held_out(trainer.fitted(), &strategy, &test, 60).unwrap().remove(0);
+        let after = held_out(trainer.fitted(), &strategy, &test, 60, true).unwrap().remove(0);
         assert!(after.psnr > before.psnr + 0.5, "{}: {} dB to {} dB", recipe.id, before.psnr, after.psnr);
         assert_eq!(avatar.gaussians.sh_degree, usize::from(recipe.sh_degree), "{}", recipe.id);
         let fixed = recipe.densify.is_none();

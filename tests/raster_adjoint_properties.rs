@@ -2,9 +2,12 @@
 //! with the image: order, threads, vector widths.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; the agreement is printed")]
 
+#[path = "support/differences.rs"]
+mod differences;
 #[path = "support/random_scene.rs"]
 mod random_scene;
 
+use differences::{assert_close, assert_gradient, difference};
 use glam::{Mat3, Vec3};
 use proptest::prelude::*;
 use random_scene::{Random, camera, chosen, posed};
@@ -59,39 +62,9 @@ impl Scene {
         pixels.into_iter().enumerate().map(|(i, pixel)| of(i, pixel)).sum()
     }
 
-    /// The central difference of the loss along one number of `posed`.
-    fn difference(
-        &self,
-        chosen: &[Vec<usize>],
-        step: f32,
-        number: impl for<'a> Fn(&'a mut Posed<'static>) -> &'a mut f32,
-    ) -> f64 {
-        let moved = |by: f32| {
-            let mut posed = self.posed.clone();
-            let value = number(&mut posed);
-            *value += by;
-            (f64::from(*value), self.loss(&posed, &self.camera, chosen))
-        };
-        let ((low, before), (high, after)) = (moved(-step), moved(step));
-        (after - before) / (high - low)
-    }
-
     fn chosen(&self) -> Vec<Vec<usize>> {
         reference_splatting::chosen(&self.posed, &self.camera, &self.settings)
     }
-}
-
-/// Fails unless the found numbers are those expected, to a part of the norm that rounding explains.
-#[track_caller]
-fn assert_close(name: &str, found: &[f32], expected: &[f64], tolerance: f64) {
-    let norm = expected.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let error = std::iter::zip(found, expected).map(|(a, b)| (f64::from(*a) - b).powi(2)).sum::<f64>().sqrt();
-    println!("{name}: {:.1e} of {norm:.1e}", error / norm);
-    assert!(error <= tolerance * norm + 1e-7, "{name}: {error:e} of {norm:e}");
-}
-
-fn flat(values: &[Vec3]) -> Vec<f32> {
-    values.iter().flat_map(|v| v.to_array()).collect()
 }
 
 #[test]
@@ -109,24 +82,8 @@ fn every_kind_of_parameter_has_the_derivative_of_the_definition() {
         ]);
         let chosen = scene.chosen();
         let gradient = scene.exact();
-        let means: Vec<f64> = (0..3 * posed.len())
-            .map(|i| scene.difference(&chosen, 1e-5, |p| &mut p.means[i / 3][i % 3]))
-            .collect();
-        let factors: Vec<f64> = (0..9 * posed.len())
-            .map(|i| scene.difference(&chosen, 1e-6, |p| &mut p.factors[i / 9].col_mut(i % 9 / 3)[i % 3]))
-            .collect();
-        let opacities: Vec<f64> = (0..posed.len())
-            .map(|i| scene.difference(&chosen, 1e-4, |p| &mut p.opacities.to_mut()[i]))
-            .collect();
-        let sh: Vec<f64> = (0..3 * posed.sh.len())
-            .map(|i| scene.difference(&chosen, 1e-4, |p| &mut p.sh.to_mut()[i / 3][i % 3]))
-            .collect();
         println!("seed {seed}");
-        assert_close("means", &flat(&gradient.means), &means, 1e-5);
-        let found: Vec<f32> = gradient.factors.iter().flat_map(Mat3::to_cols_array).collect();
-        assert_close("factors", &found, &factors, 1e-5);
-        assert_close("opacities", &gradient.opacities, &opacities, 1e-5);
-        assert_close("sh", gradient.sh.as_flattened(), &sh, 1e-5);
+        assert_gradient(posed, &gradient, |p| scene.loss(p, &scene.camera, &chosen));
     }
     assert_eq!(seen.len(), 4 + 2 + 2 + 2 + 2, "{seen:?}");
 }
@@ -163,8 +120,11 @@ fn long_lists_have_the_derivatives_of_the_definition() {
     drawn.dedup();
     let some: Vec<usize> = drawn.into_iter().step_by(400).collect();
     assert!(some.len() > 10);
-    let expected: Vec<f64> =
-        some.iter().map(|&i| scene.difference(&chosen, 1e-4, |p| &mut p.opacities.to_mut()[i])).collect();
+    let loss = |p: &Posed<'static>| scene.loss(p, &scene.camera, &chosen);
+    let expected: Vec<f64> = some
+        .iter()
+        .map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities.to_mut()[i]))
+        .collect();
     let found: Vec<f32> = some.iter().map(|&i| gradient.opacities[i]).collect();
     assert_close("opacities", &found, &expected, 1e-5);
 }

@@ -2,9 +2,12 @@
 //! drew, derivatives, threads and vector widths.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; the agreement is printed")]
 
+#[path = "support/differences.rs"]
+mod differences;
 #[path = "support/random_scene.rs"]
 mod random_scene;
 
+use differences::{assert_close, assert_gradient, difference};
 use glam::{DVec3, Mat3, Vec3};
 use proptest::prelude::*;
 use random_scene::{Random, camera, posed};
@@ -143,24 +146,6 @@ impl Scene {
         };
         self.expected(posed, panes, parted).into_iter().enumerate().map(of).sum()
     }
-
-    /// The central difference of the loss along one number of the Gaussians.
-    fn difference(
-        &self,
-        parted: &[Parted],
-        step: f32,
-        number: impl for<'a> Fn(&'a mut Posed<'static>) -> &'a mut f32,
-    ) -> f64 {
-        let panes = self.layer.panes();
-        let moved = |by: f32| {
-            let mut posed = self.posed.clone();
-            let value = number(&mut posed);
-            *value += by;
-            (f64::from(*value), self.loss(&posed, &panes, parted))
-        };
-        let ((low, before), (high, after)) = (moved(-step), moved(step));
-        (after - before) / (high - low)
-    }
 }
 
 fn blank() -> Rendered {
@@ -175,14 +160,6 @@ fn channels(rendered: &Rendered) -> Vec<[f32; 5]> {
 
 fn bits(rendered: &Rendered) -> Vec<[u32; 5]> {
     channels(rendered).into_iter().map(|pixel| pixel.map(f32::to_bits)).collect()
-}
-
-#[track_caller]
-fn assert_close(name: &str, found: &[f32], expected: &[f64], tolerance: f64) {
-    let norm = expected.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let error = std::iter::zip(found, expected).map(|(a, b)| (f64::from(*a) - b).powi(2)).sum::<f64>().sqrt();
-    println!("{name}: {:.1e} of {norm:.1e}", error / norm);
-    assert!(error <= tolerance * norm + 1e-7, "{name}: {error:e} of {norm:e}");
 }
 
 fn forward_camera(size: u32) -> Camera {
@@ -373,25 +350,9 @@ fn every_kind_of_parameter_has_the_derivative_of_the_definition() {
             parts[1] += chosen.len() - front;
         }
         let gradient = scene.gradient(&mut Renderer::new());
-        let means: Vec<f64> = (0..3 * posed.len())
-            .map(|i| scene.difference(&parted, 1e-5, |p| &mut p.means[i / 3][i % 3]))
-            .collect();
-        let factors: Vec<f64> = (0..9 * posed.len())
-            .map(|i| scene.difference(&parted, 1e-6, |p| &mut p.factors[i / 9].col_mut(i % 9 / 3)[i % 3]))
-            .collect();
-        let opacities: Vec<f64> = (0..posed.len())
-            .map(|i| scene.difference(&parted, 1e-4, |p| &mut p.opacities.to_mut()[i]))
-            .collect();
-        let sh: Vec<f64> = (0..3 * posed.sh.len())
-            .map(|i| scene.difference(&parted, 1e-4, |p| &mut p.sh.to_mut()[i / 3][i % 3]))
-            .collect();
+        let panes = scene.layer.panes();
         println!("seed {seed}");
-        let found: Vec<f32> = gradient.means.iter().flat_map(|v| v.to_array()).collect();
-        assert_close("means", &found, &means, 1e-5);
-        let found: Vec<f32> = gradient.factors.iter().flat_map(Mat3::to_cols_array).collect();
-        assert_close("factors", &found, &factors, 1e-5);
-        assert_close("opacities", &gradient.opacities, &opacities, 1e-5);
-        assert_close("sh", gradient.sh.as_flattened(), &sh, 1e-5);
+        assert_gradient(posed, &gradient, |p| scene.loss(p, &panes, &parted));
     }
     assert!(parts.iter().all(|&n| n > 1500), "{parts:?}");
 }
@@ -443,8 +404,11 @@ fn long_lists_have_the_image_and_the_derivatives_of_the_definition() {
     drawn.dedup();
     let some: Vec<usize> = drawn.into_iter().step_by(400).collect();
     assert!(some.len() > 10);
-    let expected: Vec<f64> =
-        some.iter().map(|&i| scene.difference(&parted, 1e-4, |p| &mut p.opacities.to_mut()[i])).collect();
+    let loss = |p: &Posed<'static>| scene.loss(p, &panes, &parted);
+    let expected: Vec<f64> = some
+        .iter()
+        .map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities.to_mut()[i]))
+        .collect();
     let found: Vec<f32> = some.iter().map(|&i| gradient.opacities[i]).collect();
     assert_close("opacities", &found, &expected, 1e-4);
 }

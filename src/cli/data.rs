@@ -35,53 +35,51 @@ impl Data {
         })
     }
 
-    /// Loads every data set that is there, or the one of this id.
-    pub(super) fn available(&self, id: Option<&str>) -> Result<Vec<LoadedDataset>> {
-        let registry = self.registry()?;
-        if let Some(id) = id
-            && !registry.datasets.iter().any(|dataset| dataset.id == id)
-        {
-            let known: Vec<&str> = registry.datasets.iter().map(|dataset| dataset.id.as_str()).collect();
-            bail!("data set `{id}`; expected one of {}", known.join(", "));
-        }
-        let wanted = |d: &&Dataset| match id {
-            Some(id) => d.id == id,
-            None => d.is_available(),
-        };
-        registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset)).collect()
-    }
-
     /// True if a folder or a registry was named.
     pub(super) fn is_given(&self) -> bool {
         self.data.is_some() || self.datasets.is_some()
     }
 
-    /// A subject by `DATASET/SUBJECT` or by its own id alone, and the id of its data set.
+    /// A subject by `DATASET/SUBJECT` or by its own id alone, and the id of its data set. No other is loaded.
     pub(super) fn subject(&self, name: &str) -> Result<(String, Subject)> {
         let (dataset, subject) = match name.split_once('/') {
             Some((dataset, subject)) => (Some(dataset), subject),
             None => (None, name),
         };
+        let registry = self.registry()?;
         let mut known = Vec::new();
         let mut found = Vec::new();
-        for loaded in self.available(dataset)? {
-            for candidate in loaded.subjects {
-                known.push(format!("{}/{}", loaded.id, candidate.id));
-                if candidate.id == subject {
-                    found.push((loaded.id.clone(), candidate));
+        for candidate in wanted(&registry, dataset)? {
+            for id in candidate.subject_ids()? {
+                known.push(format!("{}/{id}", candidate.id));
+                if id == subject {
+                    found.push(candidate);
                 }
             }
         }
-        match found.len() {
-            1 => Ok(found.remove(0)),
-            0 => bail!("subject `{name}`; expected one of {}", known.join(", ")),
+        match found.as_slice() {
+            [dataset] => Ok((dataset.id.clone(), dataset.load_one(subject, &self.options())?)),
+            [] => bail!("subject `{name}`; expected one of {}", known.join(", ")),
             _ => bail!("subject `{name}` is in several data sets; expected DATASET/SUBJECT"),
         }
     }
 
+    /// `DATASET/SUBJECT` of the first subject that is there.
+    pub(super) fn first_subject(&self) -> Result<Option<String>> {
+        for dataset in wanted(&self.registry()?, None)? {
+            if let Some(id) = dataset.subject_ids()?.first() {
+                return Ok(Some(format!("{}/{id}", dataset.id)));
+            }
+        }
+        Ok(None)
+    }
+
+    fn options(&self) -> Options {
+        Options { model: None, clothing: self.clothing }
+    }
+
     fn load(&self, dataset: &Dataset) -> Result<LoadedDataset> {
-        let options = Options { model: None, clothing: self.clothing };
-        let subjects = dataset.load(&options)?;
+        let subjects = dataset.load(&self.options())?;
         Ok(LoadedDataset { id: dataset.id.clone(), title: dataset.title.clone(), subjects })
     }
 
@@ -94,4 +92,16 @@ impl Data {
         let loaded = registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset));
         Ok(Library::new(loaded.collect::<Result<_>>()?))
     }
+}
+
+/// Every data set that is there, or the one of this id.
+fn wanted<'r>(registry: &'r Registry, id: Option<&str>) -> Result<Vec<&'r Dataset>> {
+    let Some(id) = id else {
+        return Ok(registry.datasets.iter().filter(|dataset| dataset.is_available()).collect());
+    };
+    let Some(dataset) = registry.datasets.iter().find(|dataset| dataset.id == id) else {
+        let known: Vec<&str> = registry.datasets.iter().map(|dataset| dataset.id.as_str()).collect();
+        bail!("data set `{id}`; expected one of {}", known.join(", "));
+    };
+    Ok(vec![dataset])
 }

@@ -76,7 +76,7 @@ impl Fit {
             context.note(format!("{}: replaced when the fit is done", self.out.display()));
         }
         let watch = Watch::new(context.quiet);
-        let tests = Tests { sequences: &tests, every: self.test_every };
+        let tests = Tests { sequences: &tests, every: self.test_every, ssim: true };
         let report = fitting::fit(&training, &options, &trained_on, &files, tests, &mut |event| {
             match event {
                 FitEvent::Starting => watch.start("start", 1),
@@ -125,8 +125,8 @@ impl Fit {
             text += &format!("  training: loss {:.5}, {:.2} dB\n", last.loss, last.psnr);
         }
         for HeldOut { iteration, sequence, psnr, ssim, frames } in &report.held_out {
-            text +=
-                &format!("  {sequence} after {iteration}: {psnr:.2} dB, SSIM {ssim:.4} ({frames} frames)\n");
+            let ssim = ssim.map(|ssim| format!(", SSIM {ssim:.4}")).unwrap_or_default();
+            text += &format!("  {sequence} after {iteration}: {psnr:.2} dB{ssim} ({frames} frames)\n");
         }
         for warning in &report.warnings {
             text += &format!("  warning: {warning}\n");

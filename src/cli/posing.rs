@@ -1,7 +1,7 @@
 //! An avatar, a body, a frame of a pose track and a strategy: the arguments of `render` and `skin`.
 
 use crate::data::{body, ply, poses};
-use crate::scene::{Avatar, Binding, Body, Pose, Posed, PosedBody, RestBody};
+use crate::scene::{Avatar, Binding, Body, Camera, Pose, Posed, PosedBody, RestBody};
 use crate::strategy::{self, BoundAvatar, Choice, JointLift, PoseBuffers, Resolved, Strategy, Views};
 use anyhow::{Context as _, Result, bail};
 use std::path::{Path, PathBuf};
@@ -96,22 +96,27 @@ impl Subject {
     }
 
     /// Poses the avatar and hands the Gaussians to `use_posed`, with the strategy that posed them; without a body they stay
-    /// where they are.
+    /// as they are. Where one camera looks at them, what it does not need is left out.
     pub(super) fn posed<T>(
         &self,
         choice: Choice,
-        views: Views,
+        camera: Option<&Camera>,
         use_posed: impl FnOnce(&Posed, Option<&Resolved>) -> Result<T>,
     ) -> Result<T> {
-        match &self.rest {
-            None => use_posed(&Posed::from_static(&self.avatar.gaussians), None),
-            Some((rest, pose)) => {
-                let bound = BoundAvatar::new(&self.avatar, rest)?;
-                let body = PosedBody::new(rest, pose)?;
-                let resolved = choice.resolve(&bound, &body, views)?;
-                use_posed(&strategy::pose(&bound, &body, &resolved.strategy)?, Some(&resolved))
-            }
-        }
+        let Some((rest, pose)) = &self.rest else {
+            return use_posed(&Posed::from_static(&self.avatar.gaussians), None);
+        };
+        let bound = BoundAvatar::new(&self.avatar, rest)?;
+        let body = PosedBody::new(rest, pose)?;
+        let Some(camera) = camera else {
+            let resolved = choice.resolve(&bound, &body, Views::Any)?;
+            return use_posed(&strategy::pose(&bound, &body, &resolved.strategy)?, Some(&resolved));
+        };
+        let bound = bound.without_zero_bands();
+        let resolved = choice.resolve(&bound, &body, Views::Few(1))?;
+        let mut buffers = PoseBuffers::default();
+        let posed = strategy::pose_seen(&bound, &body, &resolved.strategy, camera, &mut buffers)?;
+        use_posed(&posed, Some(&resolved))
     }
 
     /// [`Subject::posed`] with the signs of joint quaternions followed through the track, from its first pose to this one.

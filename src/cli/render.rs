@@ -4,7 +4,6 @@ use super::posing::{Posing, picked};
 use super::{Context, Exit, selection::parse_colour};
 use crate::data::{camera, frames};
 use crate::render::splat::{self, RenderSettings};
-use crate::strategy::Views;
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 
@@ -51,7 +50,7 @@ impl Render {
         let settings = RenderSettings { background, antialiased: self.antialiased };
         let subject = self.posing.load(&self.file)?;
         let choice = self.posing.strategy();
-        let (rendered, note) = subject.posed(choice, Views::Few(1), |posed, resolved| {
+        let (rendered, note) = subject.posed(choice, Some(&view.camera), |posed, resolved| {
             Ok((splat::render(posed, &view.camera, &settings), picked(choice, resolved)))
         })?;
         match extension.as_str() {

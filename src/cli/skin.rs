@@ -4,7 +4,7 @@ use super::posing::{Posing, picked};
 use super::{Context, Exit};
 use crate::data::ply;
 use crate::scene::{Avatar, Binding};
-use crate::strategy::{Choice, Resolved, RotationChoice, Strategy, Views, bake};
+use crate::strategy::{Choice, Resolved, RotationChoice, Strategy, bake};
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 
@@ -48,9 +48,8 @@ impl Skin {
                 let baked = subject.posed_following(&strategy, |posed| Ok(bake(posed, canonical)))?;
                 (baked, Some(Resolved { strategy, bound: None }))
             }
-            _ => subject.posed(choice, Views::Any, |posed, resolved| {
-                Ok((bake(posed, canonical), resolved.copied()))
-            })?,
+            _ => subject
+                .posed(choice, None, |posed, resolved| Ok((bake(posed, canonical), resolved.copied())))?,
         };
         let strategy = resolved.map(|resolved| resolved.strategy.to_string()).unwrap_or_default();
         let avatar = Avatar { gaussians: baked.gaussians, binding: Binding::Static };

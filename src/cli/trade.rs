@@ -124,16 +124,16 @@ impl Trading {
     /// The subject and its full name.
     fn subject(&self) -> Result<(String, Subject)> {
         let named = match (&self.subject, self.data.is_given()) {
-            (Some(subject), _) => subject.as_str(),
-            (None, false) => DEFAULT_SUBJECT,
+            (Some(subject), _) => subject.clone(),
+            (None, false) => DEFAULT_SUBJECT.to_owned(),
             (None, true) => {
-                let first = self.data.available(None)?.into_iter().find(|d| !d.subjects.is_empty());
-                let Some(mut dataset) = first else { bail!("--data: no subject; expected at least one") };
-                let subject = dataset.subjects.swap_remove(0);
-                return Ok((format!("{}/{}", dataset.id, subject.id), subject));
+                let Some(first) = self.data.first_subject()? else {
+                    bail!("--data: no subject; expected at least one")
+                };
+                first
             }
         };
-        let (dataset, subject) = self.data.subject(named)?;
+        let (dataset, subject) = self.data.subject(&named)?;
         Ok((format!("{dataset}/{}", subject.id), subject))
     }
 

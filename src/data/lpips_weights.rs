@@ -16,11 +16,14 @@ pub const ALEX_BYTES: &[u8] = include_bytes!("../../assets/lpips_alex.safetensor
 
 /// The AlexNet that comes with the program; read on first use.
 pub fn embedded() -> &'static Network {
-    static ALEX: LazyLock<Network> = LazyLock::new(|| {
-        let path = Path::new("assets/lpips_alex.safetensors");
-        from_bytes(path, ALEX_BYTES).expect("a test reads the embedded file")
-    });
+    static ALEX: LazyLock<Network> = LazyLock::new(read_embedded);
     &ALEX
+}
+
+/// Reads the weights of [`embedded`] anew.
+pub fn read_embedded() -> Network {
+    from_bytes(Path::new("assets/lpips_alex.safetensors"), ALEX_BYTES)
+        .expect("a test reads the embedded file")
 }
 
 const EXPECTED: &str = "a safetensors file with the weights of LPIPS";

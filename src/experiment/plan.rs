@@ -122,6 +122,8 @@ pub struct Job {
     pub resolution: Option<u32>,
     /// Whether the antialiased rasterizer renders.
     pub antialiased: bool,
+    /// Whether the table has a column for SSIM.
+    pub ssim: bool,
     /// Whether the table has a column for LPIPS.
     pub lpips: bool,
     /// What is rendered.
@@ -308,7 +310,8 @@ impl Builder<'_> {
     ) {
         let test = find_sequence(self.subject(row), &row.sequence).clone();
         let resolution = self.options.profile.resolution;
-        let lpips = experiment.columns.iter().any(|column| column.metric == MetricKind::Lpips);
+        let shows = |metric| experiment.columns.iter().any(|column| column.metric == metric);
+        let (ssim, lpips) = (shows(MetricKind::Ssim), shows(MetricKind::Lpips));
         let weights = self.options.lpips_weights.as_ref().filter(|given| given.net == protocol.lpips.net);
         let choices = Protocol { title: String::new(), source: String::new(), ..protocol.clone() };
         for &frame in &row.frames {
@@ -317,7 +320,7 @@ impl Builder<'_> {
                     "code": CodeVersions::CURRENT, "test": test.digest, "frame": frame,
                     "avatar": prepared.avatar, "strategy": prepared.strategy, "protocol": choices,
                     "antialiased": experiment.antialiased, "resolution": resolution,
-                    "lpips": lpips, "lpips_weights": weights.filter(|_| lpips),
+                    "ssim": ssim, "lpips": lpips, "lpips_weights": weights.filter(|_| lpips),
                 });
                 JobVariant {
                     id: prepared.variant.id.clone(),
@@ -337,6 +340,7 @@ impl Builder<'_> {
                 protocol: protocol.id.clone(),
                 resolution,
                 antialiased: experiment.antialiased,
+                ssim,
                 lpips,
                 variants: variants.collect(),
             });

@@ -32,7 +32,7 @@ impl Profile {
             max_train_frames: Some(12),
             max_test_frames: Some(6),
             resolution: Some(256),
-            fit_iterations: Some(300),
+            fit_iterations: Some(240),
             avatar_edge_mm: 14,
         }
     }

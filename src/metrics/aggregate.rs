@@ -38,8 +38,8 @@ pub struct Summary {
     /// PSNR of the pooled mean squared errors.
     #[serde(with = "infinite_as_null")]
     pub psnr_pooled: f64,
-    /// Mean of frames.
-    pub ssim: f64,
+    /// Mean of frames; `None` (`null`) unless every frame has it.
+    pub ssim: Option<f64>,
     /// Mean of frames; `None` (`null`) unless every frame has it.
     pub lpips: Option<f64>,
 }
@@ -73,7 +73,10 @@ impl Protocol {
         let channel_mse = [pooled(0), pooled(1), pooled(2)];
         let psnr_mean_of_frames = mean(|frame| frame.psnr);
         let psnr_pooled = self.psnr.psnr(channel_mse);
-        let lpips: Option<f64> = frames.iter().map(|frame| frame.lpips).sum();
+        let known = |value: fn(&FrameScore) -> Option<f64>| -> Option<f64> {
+            let sum: Option<f64> = frames.iter().map(value).sum();
+            sum.map(|sum| sum / count)
+        };
         Ok(Summary {
             protocol: key,
             frames: frames.len() as u64,
@@ -86,8 +89,8 @@ impl Protocol {
             },
             psnr_mean_of_frames,
             psnr_pooled,
-            ssim: mean(|frame| frame.ssim),
-            lpips: lpips.map(|sum| sum / count),
+            ssim: known(|frame| frame.ssim),
+            lpips: known(|frame| frame.lpips),
         })
     }
 }
@@ -106,7 +109,7 @@ mod tests {
             channel_mse,
             mse,
             psnr,
-            ssim: 1.0 - mse,
+            ssim: Some(1.0 - mse),
             lpips,
             lpips_missing: None,
         }
@@ -124,7 +127,7 @@ mod tests {
             assert!((summary.psnr_pooled - -10.0 * mse.log10()).abs() < 1e-12);
             let chosen = if pooled { summary.psnr_pooled } else { summary.psnr_mean_of_frames };
             assert_eq!(summary.psnr, chosen);
-            assert!((summary.ssim - 0.99495).abs() < 1e-12);
+            assert!((summary.ssim.unwrap() - 0.99495).abs() < 1e-12);
             assert_eq!((summary.frames, summary.pixels, summary.lpips), (2, 400, Some(0.5)));
         }
     }

@@ -27,6 +27,6 @@ pub use planes::Planes;
 pub use protocol::{Background, Clamp, PROTOCOLS, Protocol, ProtocolId, Quantisation};
 pub use psnr::{ErrorSums, PsnrVariant};
 pub use region::Region;
-pub use score::{FrameScore, Truth};
+pub use score::{FrameScore, Truth, Wanted};
 pub use ssim::{SsimSettings, SsimVariant, ssim};
 pub use variants::{VARIANT_IDS, all_variants};

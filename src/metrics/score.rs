@@ -57,13 +57,22 @@ pub struct FrameScore {
     /// dB; +inf for identical images, which JSON holds as `null`.
     #[serde(with = "infinite_as_null")]
     pub psnr: f64,
-    /// SSIM.
-    pub ssim: f64,
+    /// SSIM; `None` (`null`) means "not computed".
+    pub ssim: Option<f64>,
     /// LPIPS; `None` (`null`) means "not computed".
     pub lpips: Option<f64>,
     /// Why a scorer that was there has not computed it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lpips_missing: Option<String>,
+}
+
+/// What is computed of a frame besides the squared error.
+#[derive(Clone, Copy)]
+pub struct Wanted<'a> {
+    /// SSIM.
+    pub ssim: bool,
+    /// LPIPS, by this scorer.
+    pub lpips: Option<&'a dyn PerceptualDistance>,
 }
 
 /// The two images as the metrics see them, after steps 1 to 3 of [`Protocol`].
@@ -84,12 +93,11 @@ impl Protocol {
     /// Images or masks of different sizes, values that are not finite, a missing or empty mask where the region needs
     /// one, a region too small for the SSIM window.
     pub fn score(&self, render: &Image, truth: Truth<'_>) -> Result<FrameScore, MetricsError> {
-        self.score_with(render, truth, None)
+        self.score_with(render, truth, Wanted { ssim: true, lpips: None })
     }
 
-    /// As [`Protocol::score`]; LPIPS too if there is a scorer for it. It stays `None`, and the score says why, if there
-    /// are no weights for its network, if the image is too small for it, and in [`Region::Mask`], since LPIPS has no
-    /// masked form.
+    /// What is wanted. LPIPS stays `None`, and the score says why, if there are no weights for its network, if the image
+    /// is too small for it, and in [`Region::Mask`], since LPIPS has no masked form.
     ///
     /// # Errors
     /// As [`Protocol::score`], and other errors of the scorer.
@@ -97,13 +105,14 @@ impl Protocol {
         &self,
         render: &Image,
         truth: Truth<'_>,
-        lpips: Option<&dyn PerceptualDistance>,
+        wanted: Wanted<'_>,
     ) -> Result<FrameScore, MetricsError> {
         let Prepared { render, truth, weights } = self.prepare(render, truth)?;
         let sums = ErrorSums::new(&render, &truth, weights.as_deref())?;
-        let ssim =
-            ssim_of_planes(&render, &truth, &self.ssim.settings(), self.ssim.id(), weights.as_deref())?;
-        let distance = lpips.map(|scorer| match weights {
+        let ssim = wanted.ssim.then(|| {
+            ssim_of_planes(&render, &truth, &self.ssim.settings(), self.ssim.id(), weights.as_deref())
+        });
+        let distance = wanted.lpips.map(|scorer| match weights {
             None => scorer.distance(&render, &truth, self.lpips),
             Some(_) => Err(MetricsError::NoImage { region: self.region.id() }),
         });
@@ -119,7 +128,7 @@ impl Protocol {
             channel_mse: sums.channel_mse(),
             mse: sums.mse(),
             psnr: self.psnr.psnr(sums.channel_mse()),
-            ssim,
+            ssim: ssim.transpose()?,
             lpips,
             lpips_missing,
         })
@@ -283,7 +292,7 @@ mod tests {
         let render = truth.composited(&alpha, [1.0; 3]).unwrap();
         let straight = Truth::Straight { rgb: &truth, alpha: &alpha };
         let score = protocol("").score(&render, straight).unwrap();
-        assert!(score.mse < 1e-15 && (score.ssim - 1.0).abs() < 1e-9, "{score:?}");
+        assert!(score.mse < 1e-15 && (score.ssim.unwrap() - 1.0).abs() < 1e-9, "{score:?}");
         let captured = protocol("+background=captured").score(&render, straight).unwrap();
         assert!(captured.mse > 0.1);
         assert_eq!(protocol("+background=captured").score(&truth, straight).unwrap().psnr, f64::INFINITY);
@@ -399,8 +408,11 @@ mod tests {
     fn a_scorer_fills_lpips_with_the_prepared_images() {
         let (render, truth, mask) = (gradient([0.4; 3]), gradient([0.3; 3]), left_half());
         let truth = Truth::Composited { rgb: &truth, mask: Some(&mask) };
+        let wanted = Wanted { ssim: false, lpips: Some(&MeanDifference) };
         let lpips = |changes: &str| {
-            protocol(changes).score_with(&render, truth, Some(&MeanDifference)).unwrap().lpips
+            let score = protocol(changes).score_with(&render, truth, wanted).unwrap();
+            assert_eq!(score.ssim, None);
+            score.lpips
         };
         assert!((lpips("").unwrap() - 0.1).abs() < 1e-7);
         assert!((lpips("+region=image-times-mask").unwrap() - 0.05).abs() < 1e-7);

@@ -128,7 +128,7 @@ impl VariantResults {
         let summary = self.summary.as_ref()?;
         match metric {
             MetricKind::Psnr => Some(summary.psnr),
-            MetricKind::Ssim => Some(summary.ssim),
+            MetricKind::Ssim => summary.ssim,
             MetricKind::Lpips => summary.lpips,
             MetricKind::Splats => self.splats.map(|count| count as f64),
         }
@@ -159,7 +159,7 @@ impl FrameResult {
         let score = self.score.as_ref()?;
         match metric {
             MetricKind::Psnr => Some(score.psnr),
-            MetricKind::Ssim => Some(score.ssim),
+            MetricKind::Ssim => score.ssim,
             MetricKind::Lpips => score.lpips,
             MetricKind::Splats => None,
         }

@@ -73,7 +73,7 @@ fn fit(
     let files = FitFiles { avatar: file, start };
     let name = format!("{}/{}/{}", build.dataset, build.subject, sequence.id);
     let every = planned.options.iterations.div_ceil(CURVE_POINTS);
-    let tests = Tests { sequences: tests, every: Some(every) };
+    let tests = Tests { sequences: tests, every: Some(every), ssim: false };
     fitting::fit(sequence, &planned.options, &name, &files, tests, &mut |event| {
         if let FitEvent::Step(step) = event {
             watch(Event::Fitting(step));

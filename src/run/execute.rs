@@ -9,7 +9,7 @@ use crate::data::Sequence;
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
 use crate::fit::train::Step;
 use crate::metrics::lpips::{NetworkSource, OneFrame};
-use crate::metrics::{self, PerceptualDistance, Protocol};
+use crate::metrics::{self, PerceptualDistance, Protocol, Wanted};
 use crate::render::splat::Renderer;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -166,7 +166,8 @@ fn run_variant(
     let drawn = frame.draw(job, variant, avatar, renderer, seconds)?;
     let start = Instant::now();
     let truth = metrics::Truth::Straight { rgb: &frame.truth.rgb, alpha: &frame.truth.alpha };
-    let score = protocol.score_with(&drawn.image, truth, job.lpips.then_some(distances))?;
+    let wanted = Wanted { ssim: job.ssim, lpips: job.lpips.then_some(distances) };
+    let score = protocol.score_with(&drawn.image, truth, wanted)?;
     seconds.score = start.elapsed().as_secs_f64();
     let Drawn { splats, visible_splats, picked, .. } = drawn;
     Ok(Outcome::Scored { score, splats, visible_splats, picked })

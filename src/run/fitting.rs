@@ -81,8 +81,8 @@ pub struct HeldOut {
     pub sequence: String,
     /// Mean PSNR over its frames, dB.
     pub psnr: f64,
-    /// Mean SSIM over its frames.
-    pub ssim: f64,
+    /// Mean SSIM over its frames; none if nobody asked.
+    pub ssim: Option<f64>,
     /// Number of frames.
     pub frames: usize,
 }
@@ -94,6 +94,8 @@ pub struct Tests<'a> {
     pub sequences: &'a [Sequence],
     /// Scored each time so many iterations are done, and at the start; at the end in any case.
     pub every: Option<u32>,
+    /// SSIM besides PSNR.
+    pub ssim: bool,
 }
 
 impl Tests<'_> {
@@ -103,7 +105,7 @@ impl Tests<'_> {
 
     fn score(&self, fitted: Fitted<'_>, options: &FitOptions, done: u32) -> Result<Vec<HeldOut>, Error> {
         let strategy = options.recipe.strategy.parse()?;
-        held_out(fitted, &strategy, self.sequences, done)
+        held_out(fitted, &strategy, self.sequences, done, self.ssim)
     }
 }
 

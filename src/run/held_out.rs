@@ -6,7 +6,7 @@ use super::frame::together;
 use crate::data::Sequence;
 use crate::fit::texture::TexturedBody;
 use crate::fit::train::Fitted;
-use crate::metrics::{self, Protocol};
+use crate::metrics::{self, Protocol, Wanted};
 use crate::render::splat::{RenderSettings, Renderer};
 use crate::scene::{PosedBody, RestBody};
 use crate::strategy::{BoundAvatar, PoseBuffers, Strategy, pose_seen};
@@ -23,6 +23,7 @@ pub fn held_out<'a>(
     strategy: &Strategy,
     sequences: &[Sequence],
     iteration: u32,
+    ssim: bool,
 ) -> Result<Vec<HeldOut>, Error> {
     let fitted = fitted.into();
     let mut bound: Option<(&Arc<RestBody>, BoundAvatar)> = None;
@@ -35,9 +36,16 @@ pub fn held_out<'a>(
                 bound.insert((&sequence.body, fresh))
             }
         };
-        scores.push(of_sequence(bound, fitted.mesh, strategy, sequence, iteration)?);
+        scores.push(of_sequence(bound, fitted.mesh, strategy, sequence, Asked { iteration, ssim })?);
     }
     Ok(scores)
+}
+
+/// What is said of a sequence.
+#[derive(Clone, Copy)]
+struct Asked {
+    iteration: u32,
+    ssim: bool,
 }
 
 fn of_sequence(
@@ -45,7 +53,7 @@ fn of_sequence(
     mesh: Option<&TexturedBody>,
     strategy: &Strategy,
     sequence: &Sequence,
-    iteration: u32,
+    asked: Asked,
 ) -> Result<HeldOut, Error> {
     let protocol = Protocol::parse("default")?;
     let background = protocol.background_colour().unwrap_or([1.0; 3]);
@@ -61,13 +69,14 @@ fn of_sequence(
             None => renderer.render(&posed, camera, &settings).image,
             Some(mesh) => together(renderer, &posed, (mesh, pose), camera, &settings)?.image,
         };
-        Ok(protocol.score(&image, metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha })?)
+        let truth = metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha };
+        Ok(protocol.score_with(&image, truth, Wanted { ssim: asked.ssim, lpips: None })?)
     };
     let frames = (0..sequence.frames.len()).into_par_iter();
     let scores = frames.map_init(Renderer::new, score).collect::<Result<Vec<_>, Error>>()?;
     let summary = protocol.aggregate(&scores)?;
     Ok(HeldOut {
-        iteration,
+        iteration: asked.iteration,
         sequence: sequence.id.clone(),
         psnr: summary.psnr,
         ssim: summary.ssim,

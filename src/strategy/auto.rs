@@ -48,14 +48,13 @@ pub struct Resolved {
     pub bound: Option<f64>,
 }
 
-/// What [`Auto`] chooses from, in the order in which it tries them, with estimated nanoseconds per Gaussian from the
-/// operations of each. A first measurement (`cargo bench --bench posing -- candidates`, 100,000 Gaussians, one core of a
-/// busy machine) does not confirm the order: 39 for the heaviest bone, 32 for the normalised sum, 35 for the exact average.
-/// An order, not a clock: the choice depends on avatar, pose and tolerance alone.
-pub const CANDIDATES: [(RotationChoice, f64); 3] = [
-    (RotationChoice::QuaternionAverage(Solver::Power { steps: 0, start: Start::Heaviest }), 13.0),
-    (RotationChoice::QuaternionAverage(Solver::Nlerp), 16.0),
-    (RotationChoice::QuaternionAverage(Solver::ClosedForm), 20.0),
+/// What [`Auto`] chooses from, in the order in which it tries them, with nanoseconds per Gaussian as measured (`cargo bench
+/// --bench posing -- candidates`, 100,000 Gaussians without SH, one core; medians of four runs spread by 2 either way). The
+/// normalised sum took 40 there, every other solver 75 and more: the exact average is cheaper than both. An order, not a
+/// clock: the choice depends on avatar, pose and tolerance alone.
+pub const CANDIDATES: [(RotationChoice, f64); 2] = [
+    (RotationChoice::QuaternionAverage(Solver::Power { steps: 0, start: Start::Heaviest }), 34.0),
+    (RotationChoice::QuaternionAverage(Solver::ClosedForm), 38.0),
 ];
 
 /// Views of one pose up to which the view direction is turned in place of SH of a degree. Rotating degree 3 costs about 100

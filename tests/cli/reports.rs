@@ -107,3 +107,25 @@ fn what_is_no_result_is_named() {
     desk.run(args!["report", "run", "--table", "table9"]).refuses(&["table9", "tiny"], "no such table");
     desk.run(args!["report", data("blender")]).refuses(&["results.json"], "a folder of data");
 }
+
+/// Metrics that no column shows are not computed, and the others keep their bits.
+#[test]
+fn only_metrics_with_a_column_are_computed() {
+    let desk = Desk::new();
+    let tiny = include_str!("tiny.toml");
+    desk.put("tiny.toml", tiny);
+    desk.put(
+        "one.toml",
+        tiny.replace("id = \"tiny\"", "id = \"one\"")
+            .replace("[[columns]]\nmetric = \"ssim\"\ndecimals = 4\n", ""),
+    );
+    let scores = |table: &str| {
+        desk.ok(args!["run", table, "--limit", "1", "--out", "run"]);
+        let results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
+        let summary = "/tables/0/sequences/0/variants/0/summary";
+        results.pointer(summary).unwrap_or_else(|| panic!("{summary}: {results}")).clone()
+    };
+    let (both, one) = (scores("tiny.toml"), scores("one.toml"));
+    assert!(both["ssim"].is_number() && one["ssim"].is_null(), "{both} {one}");
+    assert_eq!(both["psnr"], one["psnr"]);
+}

@@ -81,7 +81,7 @@ pub(super) fn score(protocol: &str, psnr: f64, ssim: f64, lpips: Option<f64>) ->
         channel_mse: [mse; 3],
         mse,
         psnr,
-        ssim,
+        ssim: Some(ssim),
         lpips,
         lpips_missing: None,
     }

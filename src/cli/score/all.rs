@@ -4,7 +4,7 @@ use super::pairs::{self, Pair};
 use super::{Context, Format, Score, emit, emit_json};
 use crate::data::lpips_weights::Networks;
 use crate::metrics::lpips::OneFrame;
-use crate::metrics::{FrameScore, MetricsError, PROTOCOLS, Protocol, Region, Summary, Truth};
+use crate::metrics::{FrameScore, MetricsError, PROTOCOLS, Protocol, Region, Summary, Truth, Wanted};
 use anyhow::{Context as _, Result};
 use serde_json::json;
 use std::fmt::Write;
@@ -61,7 +61,8 @@ fn frame(arguments: &Score, pair: &Pair, networks: &Networks) -> Result<Vec<Cell
         let background = arguments.background(Some(protocol));
         let (render, truth) = loaded.over(background)?;
         let truth = Truth::Composited { rgb: &truth, mask: loaded.mask() };
-        let score = match protocol.score_with(&render, truth, Some(&distances)) {
+        let score = match protocol.score_with(&render, truth, Wanted { ssim: true, lpips: Some(&distances) })
+        {
             Err(error) if is_of_the_input(&error) => return Err(error).with_context(|| pair.files()),
             score => score.map_err(|error| error.to_string()),
         };
@@ -114,13 +115,11 @@ fn text(rows: &[Row], frames: usize) -> String {
 fn cells(row: &Row) -> [String; 8] {
     let protocol = row.protocol;
     let id = protocol.key().to_string();
+    let known =
+        |value: Option<f64>| value.map_or_else(|| "not computed".to_owned(), |value| format!("{value:.5}"));
     let [psnr, ssim, lpips] = match &row.outcome {
         Err(_) => ["not computed".to_owned(), "-".to_owned(), "-".to_owned()],
-        Ok(summary) => [
-            format!("{:.3}", summary.psnr),
-            format!("{:.5}", summary.ssim),
-            summary.lpips.map_or_else(|| "not computed".to_owned(), |value| format!("{value:.5}")),
-        ],
+        Ok(summary) => [format!("{:.3}", summary.psnr), known(summary.ssim), known(summary.lpips)],
     };
     let background = match protocol.background_colour() {
         Some([r, g, b]) => format!("{r},{g},{b}"),
@@ -162,7 +161,7 @@ fn spread(rows: &[Row]) -> String {
     format!(
         "The protocol alone, whole images: PSNR {}, SSIM {}, LPIPS {}.",
         range(&|summary| Some(summary.psnr), 3),
-        range(&|summary| Some(summary.ssim), 5),
+        range(&|summary| summary.ssim, 5),
         range(&|summary| summary.lpips, 5)
     )
 }

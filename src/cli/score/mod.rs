@@ -10,7 +10,7 @@ use super::{Context, Exit};
 use crate::data::lpips_weights::Networks;
 use crate::metrics::lpips::OneFrame;
 use crate::metrics::{
-    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Summary, Truth, all_variants,
+    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Summary, Truth, Wanted, all_variants,
 };
 use crate::scene::Image;
 use anyhow::{Context as _, Result};
@@ -127,7 +127,8 @@ impl Score {
             };
         }
         let truth = Truth::Composited { rgb: &truth, mask };
-        let protocol = protocol.map(|p| p.score_with(&render, truth, Some(&distances))).transpose();
+        let wanted = Wanted { ssim: true, lpips: Some(&distances) };
+        let protocol = protocol.map(|p| p.score_with(&render, truth, wanted)).transpose();
         let protocol = protocol.with_context(context)?;
         let over_another_background = loaded.lies_over_another(background);
         Ok(Scored { name: pair.name.clone(), variants, not_computed, protocol, over_another_background })
@@ -187,13 +188,16 @@ fn emit_folder(scored: &[Scored], protocol: Option<&Protocol>, format: Format) -
 fn protocol_line(
     protocol: &impl std::fmt::Display,
     psnr: f64,
-    ssim: f64,
+    ssim: Option<f64>,
     lpips: Option<f64>,
     missing: Option<&str>,
 ) -> String {
     let missing = missing.unwrap_or("no reason given");
-    let lpips = lpips.map_or_else(|| format!("not computed ({missing})"), |value| format!("{value:.6}"));
-    format!("protocol {protocol}: psnr {psnr:.6}  ssim {ssim:.6}  lpips {lpips}\n")
+    let known = |value: Option<f64>| {
+        value.map_or_else(|| format!("not computed ({missing})"), |value| format!("{value:.6}"))
+    };
+    let (ssim, lpips) = (known(ssim), known(lpips));
+    format!("protocol {protocol}: psnr {psnr:.6}  ssim {ssim}  lpips {lpips}\n")
 }
 
 impl Scored {

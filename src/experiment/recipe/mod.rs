@@ -225,6 +225,9 @@ pub struct LossTerms {
     pub opacity: f32,
     /// Of the mean squared distance from where the Gaussians started, per square metre.
     pub displacement: f32,
+    /// Of the mean over Gaussians of the squared norm of their SH coefficients beyond degree 0: directions from which
+    /// nothing was seen look like those from which something was.
+    pub sh_rest: f32,
 }
 
 /// A textured mesh that is drawn with the Gaussians (HAHA): the body, its vertices moved onto the outlines in the masks,
@@ -309,6 +312,7 @@ impl Recipe {
             ("loss.scale", loss.scale),
             ("loss.opacity", loss.opacity),
             ("loss.displacement", loss.displacement),
+            ("loss.sh_rest", loss.sh_rest),
         ];
         let shares = [("sh_step", self.sh_step), ("loss.ssim", loss.ssim)];
         let refuse = |key: &str, value: String, expected: &str| {

@@ -4,6 +4,7 @@ use super::parameters::Origin;
 use crate::experiment::recipe::LossTerms;
 use crate::scene::{Avatar, AvatarGradient, Binding};
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Adds the derivatives of all terms to `gradient` and returns their weighted sum.
 pub(super) fn add(
@@ -32,6 +33,9 @@ pub(super) fn add(
             *out += 2.0 * weight * opacity * opacity * (1.0 - opacity);
         }
     }
+    if terms.sh_rest > 0.0 {
+        total += sh_rest(terms.sh_rest / n, avatar, gradient);
+    }
     if terms.displacement > 0.0 {
         total += displacement(terms.displacement / n, avatar, origins, gradient);
     }
@@ -59,6 +63,29 @@ fn long_thin(terms: &LossTerms, scale: Vec3, weight: f32, out: &mut Vec3) -> f32
         out[first] += weight * long;
     }
     value
+}
+
+/// `weight` times the sum of the squared SH coefficients beyond degree 0. In parts of fixed size, so that the sum does not
+/// depend on the number of threads.
+fn sh_rest(weight: f32, avatar: &Avatar, gradient: &mut AvatarGradient) -> f64 {
+    const PART: usize = 4096;
+    let count = avatar.gaussians.sh_count();
+    let parts = avatar.gaussians.sh.par_chunks(PART * count).zip(gradient.sh.par_chunks_mut(PART * count));
+    let sums: Vec<f64> = parts
+        .map(|(own, out)| {
+            let rows = own.chunks_exact(count).zip(out.chunks_exact_mut(count));
+            rows.map(|(own, out)| {
+                let mut sum = 0.0;
+                for (own, out) in own[1..].as_flattened().iter().zip(out[1..].as_flattened_mut()) {
+                    sum += own * own;
+                    *out += 2.0 * weight * own;
+                }
+                f64::from(sum)
+            })
+            .sum()
+        })
+        .collect();
+    f64::from(weight) * sums.iter().sum::<f64>()
 }
 
 /// `weight` times the sum of the squared distances from the start (of face-bound Gaussians: along the normal).
@@ -99,8 +126,8 @@ mod tests {
             rotations: vec![[1.0, 0.0, 0.0, 0.0]; 3],
             log_scales: scales.map(|s| Vec3::from_array(s).map(f32::ln)).to_vec(),
             opacity_logits: vec![0.5, -1.0, 3.0],
-            sh_degree: 0,
-            sh: vec![[0.0; 3]; 3],
+            sh_degree: 1,
+            sh: (0..12).map(|i| [0.1 * i as f32, -0.3, 0.2]).collect(),
         };
         let binding = Binding::Face(FaceBinding {
             faces: vec![0; 3],
@@ -112,8 +139,10 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_the_value() {
-        let recipe =
-            Recipe::parse("pure-skinned+loss.long_thin=0.3+loss.scale=40.0+loss.opacity=0.2").expect("known");
+        let recipe = Recipe::parse(
+            "pure-skinned+loss.long_thin=0.3+loss.scale=40.0+loss.opacity=0.2+loss.sh_rest=0.7",
+        )
+        .expect("known");
         let terms = LossTerms { displacement: 5.0, ..recipe.loss };
         let mut moved = avatar();
         let origins = Origin::of(&moved);
@@ -145,6 +174,9 @@ mod tests {
                 check(&change, gradient.log_scales[i][axis]);
             }
             check(&|a, h| a.gaussians.opacity_logits[i] += h, gradient.opacity_logits[i]);
+            for k in 4 * i..4 * i + 4 {
+                check(&|a, h| a.gaussians.sh[k][1] += h, gradient.sh[k][1]);
+            }
             let change = |a: &mut Avatar, h: f32| {
                 if let Binding::Face(binding) = &mut a.binding {
                     binding.offsets[i] += h;

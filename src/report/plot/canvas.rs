@@ -1,9 +1,12 @@
 //! What all plots share: the two kinds of paper, the font, colours.
 
 use plotters::backend::{BitMapBackend, DrawingBackend, SVGBackend};
+use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
-use plotters::style::{FontStyle, RGBColor, register_font};
+use plotters::style::{FontStyle, IntoFont, RGBColor, register_font};
 use std::sync::OnceLock;
 
 /// Width and height of every plot, pixels.
@@ -111,6 +114,45 @@ fn load_font() -> Result<(), PlotError> {
     static LOADED: OnceLock<bool> = OnceLock::new();
     let loaded = LOADED.get_or_init(|| register_font(FAMILY, FontStyle::Normal, FONT).is_ok());
     loaded.then_some(()).ok_or_else(|| PlotError::backend("the embedded font cannot be read"))
+}
+
+/// A chart with a title and room for both axes.
+pub(super) fn builder<'a, 'b, B: DrawingBackend>(
+    paper: &'a DrawingArea<B, Shift>,
+    title: &str,
+) -> ChartBuilder<'a, 'b, B> {
+    let mut builder = ChartBuilder::on(paper);
+    builder
+        .margin(16)
+        .caption(title, (FAMILY, 20).into_font().color(&INK))
+        .x_label_area_size(48)
+        .y_label_area_size(72);
+    builder
+}
+
+/// Axes x and y with their labels and ticks, and the lines of the grid.
+pub(super) fn mesh<'a, B, X, Y>(
+    chart: &mut ChartContext<'a, B, Cartesian2d<X, Y>>,
+    labels: [&str; 2],
+    ticks: [&dyn Fn(f64) -> String; 2],
+) -> Result<(), PlotError>
+where
+    B: DrawingBackend + 'a,
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    chart
+        .configure_mesh()
+        .x_desc(labels[0])
+        .y_desc(labels[1])
+        .axis_desc_style((FAMILY, 15))
+        .label_style((FAMILY, 13))
+        .x_label_formatter(&|v| ticks[0](*v))
+        .y_label_formatter(&|v| ticks[1](*v))
+        .bold_line_style(PALE)
+        .light_line_style(RGBColor(245, 245, 245))
+        .draw()
+        .map_err(PlotError::backend)
 }
 
 /// A range that holds all values with some room, never empty. On a logarithmic axis the room is a factor.

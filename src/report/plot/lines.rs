@@ -1,17 +1,17 @@
 //! Named curves over a common x.
 
 use super::PlotError;
-use super::canvas::{COLOURS, FAMILY, Figure, INK, PALE, range};
+use super::canvas::{COLOURS, FAMILY, Figure, PALE, builder, mesh, range};
 use super::log_axis::{LogAxis, tick};
 use plotters::backend::DrawingBackend;
-use plotters::chart::{ChartBuilder, ChartContext, SeriesLabelPosition};
+use plotters::chart::{ChartContext, SeriesLabelPosition};
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::drawing::DrawingArea;
 use plotters::element::{Circle, PathElement};
 use plotters::series::LineSeries;
-use plotters::style::{Color, IntoFont, RGBColor, ShapeStyle};
+use plotters::style::{Color, RGBColor, ShapeStyle};
 
 /// A curve.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,12 +62,7 @@ impl Figure for Lines {
         paper.fill(&RGBColor(255, 255, 255)).map_err(PlotError::backend)?;
         let coordinate = |k: usize| self.series.iter().flat_map(|s| &s.points).map(move |p| p[k]);
         let (xs, ys) = (range(coordinate(0), false), range(coordinate(1), self.log_y));
-        let mut builder = ChartBuilder::on(paper);
-        builder
-            .margin(16)
-            .caption(&self.title, (FAMILY, 20).into_font().color(&INK))
-            .x_label_area_size(48)
-            .y_label_area_size(72);
+        let mut builder = builder(paper, &self.title);
         if self.log_y {
             let chart = builder.build_cartesian_2d(xs, LogAxis(ys)).map_err(PlotError::backend)?;
             self.fill(chart, &tick)
@@ -96,18 +91,7 @@ impl Lines {
         X: Ranged<ValueType = f64> + ValueFormatter<f64>,
         Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
     {
-        chart
-            .configure_mesh()
-            .x_desc(&self.x_label)
-            .y_desc(&self.y_label)
-            .axis_desc_style((FAMILY, 15))
-            .label_style((FAMILY, 13))
-            .x_label_formatter(&|v| plain(*v))
-            .y_label_formatter(&|v| y_tick(*v))
-            .bold_line_style(PALE)
-            .light_line_style(RGBColor(245, 245, 245))
-            .draw()
-            .map_err(PlotError::backend)?;
+        mesh(&mut chart, [&self.x_label, &self.y_label], [&plain, y_tick])?;
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let style = ShapeStyle::from(&colour).stroke_width(2);

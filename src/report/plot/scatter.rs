@@ -1,11 +1,10 @@
 //! Cost against error on logarithmic axes.
 
 use super::PlotError;
-use super::canvas::{COLOURS, FAMILY, Figure, INK, PALE, SIZE, range};
+use super::canvas::{COLOURS, FAMILY, Figure, INK, SIZE, builder, mesh, range};
 use super::labels::{FONT_SIZE, Taken};
 use super::log_axis::{LogAxis, tick};
 use plotters::backend::DrawingBackend;
-use plotters::chart::ChartBuilder;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::element::{Circle, PathElement, Text};
@@ -71,25 +70,10 @@ impl Figure for Scatter {
         let at = |p: &Point| (p.x, p.y.max(zero));
         let xs = range(self.points.iter().map(|p| p.x), true);
         let ys = range(self.points.iter().map(|p| at(p).1), true);
-        let mut chart = ChartBuilder::on(paper)
-            .margin(16)
-            .caption(&self.title, (FAMILY, 20).into_font().color(&INK))
-            .x_label_area_size(48)
-            .y_label_area_size(72)
+        let mut chart = builder(paper, &self.title)
             .build_cartesian_2d(LogAxis(xs), LogAxis(ys))
             .map_err(PlotError::backend)?;
-        chart
-            .configure_mesh()
-            .x_desc(&self.x_label)
-            .y_desc(&self.y_label)
-            .axis_desc_style((FAMILY, 15))
-            .label_style((FAMILY, 13))
-            .x_label_formatter(&|v| tick(*v))
-            .y_label_formatter(&|v| tick(*v))
-            .bold_line_style(PALE)
-            .light_line_style(RGBColor(245, 245, 245))
-            .draw()
-            .map_err(PlotError::backend)?;
+        mesh(&mut chart, [&self.x_label, &self.y_label], [&tick, &tick])?;
         let mut front: Vec<(f64, f64)> = self.points.iter().filter(|p| p.on_front).map(at).collect();
         front.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
         let line = ShapeStyle::from(&COLOURS[1]).stroke_width(2);

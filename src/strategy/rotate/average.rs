@@ -59,13 +59,15 @@ fn heaviest(joints: &Joints, indices: &[u16], weights: &[Lanes]) -> [Lanes; 4] {
     let mut quats = splat(joints.rotation[usize::from(indices[0])]);
     let mut largest = weights[0];
     for (&joint, weight) in indices.iter().zip(weights).skip(1) {
-        let own = joints.rotation[usize::from(joint)];
-        for lane in 0..LANES {
-            let heavier = weight[lane] > largest[lane];
-            largest[lane] = if heavier { weight[lane] } else { largest[lane] };
-            for k in 0..4 {
-                quats[k][lane] = if heavier { own[k] } else { quats[k][lane] };
+        // A loop per component: the compiler makes a vector select of each.
+        let heavier: [bool; LANES] = std::array::from_fn(|lane| weight[lane] > largest[lane]);
+        for (quats, own) in quats.iter_mut().zip(joints.rotation[usize::from(joint)]) {
+            for lane in 0..LANES {
+                quats[lane] = if heavier[lane] { own } else { quats[lane] };
             }
+        }
+        for lane in 0..LANES {
+            largest[lane] = largest[lane].max(weight[lane]);
         }
     }
     quats

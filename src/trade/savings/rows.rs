@@ -2,6 +2,7 @@
 
 use super::super::clock::in_turns;
 use super::scene::{Options, Scene};
+use super::scores;
 use super::{Same, Saving};
 use crate::math::rotation::angle_between;
 use crate::math::sh;
@@ -30,19 +31,21 @@ pub(super) fn all(scene: &Scene, options: &Options) -> Result<Vec<Saving>, Error
         bench.view_direction()?,
         bench.unseen()?,
         bench.frames()?,
+        scores::ssim(&bench)?,
+        scores::lpips(&bench)?,
     ])
 }
 
 /// The avatar in its poses.
-struct Bench<'a> {
-    scene: &'a Scene,
-    options: &'a Options,
-    bound: BoundAvatar,
-    bodies: Vec<PosedBody<'a>>,
-    cameras: Vec<&'a Camera>,
+pub(super) struct Bench<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) options: &'a Options,
+    pub(super) bound: BoundAvatar,
+    pub(super) bodies: Vec<PosedBody<'a>>,
+    pub(super) cameras: Vec<&'a Camera>,
 }
 
-fn strategy(spec: &str) -> Result<Strategy, StrategyError> {
+pub(super) fn strategy(spec: &str) -> Result<Strategy, StrategyError> {
     spec.parse()
 }
 
@@ -61,7 +64,7 @@ fn compared(largest: f64, allowed: f64, of: &'static str) -> Same {
 }
 
 /// Bits, for values that claim to be the same.
-fn identical(largest: f64, same: bool, of: &'static str) -> Same {
+pub(super) fn identical(largest: f64, same: bool, of: &'static str) -> Same {
     if same { Same::Identical } else { Same::Different { largest, allowed: 0.0, of } }
 }
 

@@ -1,44 +1,56 @@
 //! The rasterizer: what it leaves out, and how many pixels it draws.
 
 use super::Bench;
+use crate::render::definition::{self, Cutoffs};
 use crate::render::splat::{RenderSettings, Renderer};
 use crate::scene::{Camera, Image, Posed};
 use crate::trade::exact::Shot;
-use crate::trade::reference::{self, Cutoffs};
 use crate::trade::{Error, Fidelity, Outcome, Sweep, SweepRow, Unit, clock};
 
-/// Cut-offs that are swept, by name.
-fn choices() -> Vec<(String, Cutoffs)> {
+/// What the plain renderer does.
+#[derive(Clone, PartialEq)]
+struct Way {
+    name: String,
+    cutoffs: Cutoffs,
+    antialiased: bool,
+}
+
+/// Cut-offs that are swept.
+fn ways() -> Vec<Way> {
     let none = Cutoffs::NONE;
-    let mut all = vec![("none".to_owned(), none)];
+    let way = |name: String, cutoffs| Way { name, cutoffs, antialiased: false };
+    let mut all = vec![way("none".to_owned(), none)];
     for least in [1024.0, 255.0, 64.0, 16.0] {
-        all.push((format!("alpha 1/{least}"), Cutoffs { alpha: 1.0 / least, ..none }));
+        all.push(way(format!("alpha 1/{least}"), Cutoffs { alpha: 1.0 / least, ..none }));
     }
     for least in [1e-4, 1e-3, 1e-2, 1e-1] {
-        all.push((format!("transmittance {least}"), Cutoffs { transmittance: least, ..none }));
+        all.push(way(format!("transmittance {least}"), Cutoffs { transmittance: least, ..none }));
     }
-    all.push(("3 sigma".to_owned(), Cutoffs { three_sigma: true, ..none }));
-    all.push(("antialiasing".to_owned(), Cutoffs { antialiased: true, ..none }));
+    all.push(way("3 sigma".to_owned(), Cutoffs { three_sigma: true, ..none }));
+    all.push(Way { antialiased: true, ..way("antialiasing".to_owned(), none) });
     for (alpha, transmittance) in [(64.0, 1e-2), (16.0, 1e-1)] {
         let name = format!("alpha 1/{alpha}, transmittance {transmittance}");
-        all.push((name, Cutoffs { alpha: 1.0 / alpha, transmittance, ..none }));
+        all.push(way(name, Cutoffs { alpha: 1.0 / alpha, transmittance, ..none }));
     }
-    all.push(("3DGS: alpha 1/255, transmittance 1e-4, 3 sigma".to_owned(), Cutoffs::STOCK));
+    all.push(way("3DGS: alpha 1/255, transmittance 1e-4, 3 sigma".to_owned(), Cutoffs::STOCK));
     all
 }
 
 /// Every cut-off alone and together, in a plain renderer that can do without.
 pub(super) fn cutoffs(bench: &Bench) -> Result<Sweep, Error> {
     let stage = bench.stage;
-    let (motion, background) = (&stage.motions[0], stage.settings.background);
+    let motion = &stage.motions[0];
     let posed: Vec<Posed> =
         motion.shots.iter().map(|shot| shot.exactly(&stage.rig, &stage.avatar.gaussians)).collect();
-    let draw = |cutoffs: Cutoffs| -> Vec<Image> {
-        let one =
-            |(posed, shot): (&Posed, &Shot)| reference::draw(posed, &shot.camera, background, cutoffs).image;
-        posed.iter().zip(&motion.shots).map(one).collect()
+    let one = |way: &Way, posed: &Posed, shot: &Shot| -> Image {
+        let settings = RenderSettings { antialiased: way.antialiased, ..stage.settings };
+        definition::draw(posed, &shot.camera, &settings, way.cutoffs).image
     };
-    let exact = draw(Cutoffs::NONE);
+    let draw = |way: &Way| -> Vec<Image> {
+        posed.iter().zip(&motion.shots).map(|(posed, shot)| one(way, posed, shot)).collect()
+    };
+    let ways = ways();
+    let exact = draw(&ways[0]);
     let row = |name: String, outcome, note: &str| SweepRow {
         motion: motion.id,
         choice: vec![name],
@@ -46,18 +58,17 @@ pub(super) fn cutoffs(bench: &Bench) -> Result<Sweep, Error> {
         note: note.to_owned(),
     };
     let mut rows = Vec::new();
-    for (name, cutoffs) in choices() {
-        let fidelity = Some(Fidelity::between(draw(cutoffs).iter().zip(&exact))?);
+    for way in &ways {
+        let fidelity = Some(Fidelity::between(draw(way).iter().zip(&exact))?);
         let repeats = stage.options.repeats.div_ceil(3);
-        let camera = &motion.shots[0].camera;
-        let work = || clock::time(repeats, || reference::draw(&posed[0], camera, background, cutoffs));
+        let work = || clock::time(repeats, || one(way, &posed[0], &motion.shots[0]));
         let time = Some(bench.pool.install(work));
-        let note = match (cutoffs == Cutoffs::NONE, cutoffs.antialiased) {
+        let note = match (*way == ways[0], way.antialiased) {
             (true, _) => "the exact image",
             (_, true) => "another definition of the image: judged under Resolution",
             _ => "",
         };
-        rows.push(row(name, Outcome { time, fidelity, ..Outcome::default() }, note));
+        rows.push(row(way.name.clone(), Outcome { time, fidelity, ..Outcome::default() }, note));
     }
     let fidelity = Some(Fidelity::between(bench.exact[0].iter().zip(&exact))?);
     let outcome = Outcome { fidelity, ..Outcome::default() };
@@ -94,7 +105,7 @@ pub(super) fn resolutions(bench: &Bench) -> Result<Sweep, Error> {
         .zip(&motion.shots)
         .map(|(posed, shot)| {
             let camera = scaled(&shot.camera, (samples, 1));
-            let drawn = reference::draw(posed, &camera, stage.settings.background, Cutoffs::NONE).image;
+            let drawn = definition::draw(posed, &camera, &stage.settings, Cutoffs::NONE).image;
             averaged(&drawn, samples as usize)
         })
         .collect();

@@ -3,10 +3,10 @@
 use super::production::angles_of;
 use super::rotations::stored_short;
 use super::{Bench, subset};
+use crate::render::definition::{self, Cutoffs};
 use crate::scene::{Avatar, Binding, Gaussians, PosedBody};
 use crate::strategy::{BoundAvatar, pose};
 use crate::trade::exact::{degrees, stock};
-use crate::trade::reference::{self, Cutoffs};
 use crate::trade::{Error, Outcome, Sweep, SweepRow, Unit};
 use glam::Vec3;
 use half::f16;
@@ -239,7 +239,7 @@ fn contributions(bench: &Bench) -> Result<Vec<f64>, Error> {
     for (at, camera) in &stage.training {
         let body = PosedBody::new(&stage.rig.body, at)?;
         let posed = pose(&stage.bound, &body, &stock())?;
-        let drawn = reference::draw(&posed, camera, stage.settings.background, Cutoffs::STOCK);
+        let drawn = definition::draw(&posed, camera, &stage.settings, Cutoffs::STOCK);
         sums.iter_mut().zip(&drawn.contributions).for_each(|(sum, share)| *sum += share);
     }
     Ok(sums)
