@@ -192,11 +192,10 @@ fn protocol_line(
     lpips: Option<f64>,
     missing: Option<&str>,
 ) -> String {
-    let missing = missing.unwrap_or("no reason given");
-    let known = |value: Option<f64>| {
+    let known = |value: Option<f64>, missing: &str| {
         value.map_or_else(|| format!("not computed ({missing})"), |value| format!("{value:.6}"))
     };
-    let (ssim, lpips) = (known(ssim), known(lpips));
+    let (ssim, lpips) = (known(ssim, "not asked for"), known(lpips, missing.unwrap_or("no reason given")));
     format!("protocol {protocol}: psnr {psnr:.6}  ssim {ssim}  lpips {lpips}\n")
 }
 

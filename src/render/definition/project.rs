@@ -3,7 +3,7 @@
 use super::Cutoffs;
 use crate::render::splat::RenderSettings;
 use crate::scene::{Camera, ColourClamp, Posed};
-use glam::{DMat2, DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 /// Side of a tile, pixels.
@@ -21,7 +21,7 @@ pub(super) struct Splat {
     pub depth: f64,
     /// Pixels; pixel i has its centre at i.
     mean: DVec2,
-    conic: DMat2,
+    footprint: Footprint,
     opacity: f64,
     pub colour: DVec3,
     /// Pixels that it may touch: x from, x to, y from, y to, half open.
@@ -30,8 +30,7 @@ pub(super) struct Splat {
 
 impl Splat {
     fn power(&self, [x, y]: [usize; 2]) -> f64 {
-        let d = self.mean - DVec2::new(x as f64, y as f64);
-        -0.5 * d.dot(self.conic * d)
+        self.footprint.power(self.mean - DVec2::new(x as f64, y as f64))
     }
 
     /// As if it reached everywhere.
@@ -43,7 +42,7 @@ impl Splat {
     pub(super) fn visible_alpha(&self, pixel: [usize; 2]) -> Option<f64> {
         let ([x, y], [x0, x1, y0, y1]) = (pixel, self.pixels);
         let within = x >= x0 && x < x1 && y >= y0 && y < y1;
-        (within && self.power(pixel) <= 0.0).then(|| self.alpha(pixel))
+        within.then(|| self.alpha(pixel))
     }
 }
 
@@ -83,22 +82,17 @@ fn project(
         return None;
     }
     let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
-    let bare = screen_covariance(posed.factors[i].as_dmat3(), p, camera);
-    let covariance = bare + DMat2::from_diagonal(DVec2::splat(LOW_PASS));
-    let determinant = covariance.determinant();
-    let compensation =
-        if settings.antialiased { (bare.determinant() / determinant).max(0.000_025).sqrt() } else { 1.0 };
+    let footprint = Footprint::new(posed.factors[i].as_dmat3(), p, camera);
+    let compensation = if settings.antialiased { footprint.compensation() } else { 1.0 };
     let opacity = f64::from(posed.opacities[i]) * compensation;
     let mean = screen_mean(p, camera);
-    let drawable = determinant != 0.0 && determinant.is_finite() && mean.is_finite();
-    if !drawable || opacity < cutoffs.alpha {
+    if !(footprint.determinant.is_finite() && mean.is_finite()) {
         return None;
     }
     let (from, to) = if cutoffs.three_sigma {
-        tiles_touched(mean, covariance)
+        tiles_touched(mean, footprint.radius())
     } else {
-        let variance = DVec2::new(covariance.x_axis.x, covariance.y_axis.y);
-        let reach = (2.0 * (opacity / cutoffs.alpha).ln() * variance).powf(0.5);
+        let reach = (2.0 * (opacity / cutoffs.alpha).ln().max(0.0) * footprint.variances()).powf(0.5);
         ((mean - reach).ceil(), (mean + reach).floor() + 1.0)
     };
     let (from, to) = (from.clamp(DVec2::ZERO, size), to.clamp(DVec2::ZERO, size));
@@ -107,27 +101,65 @@ fn project(
         gaussian: i,
         depth: p.z,
         mean,
-        conic: covariance.inverse(),
+        footprint,
         opacity,
         colour: colour(posed, i, world - camera.position()),
         pixels,
     })
 }
 
-/// J W Σ Wᵀ Jᵀ, the slope in J limited to 1.3 half fields of view; `p` is the mean in camera coordinates.
-fn screen_covariance(factor: DMat3, p: DVec3, camera: &Camera) -> DMat2 {
-    let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
-    let focal = DVec2::new(camera.fx, camera.fy);
-    let limit = 1.3 * size / (2.0 * focal);
-    let slope = (DVec2::new(p.x, p.y) / p.z).clamp(-limit, limit);
-    let jacobian = [
-        DVec3::new(focal.x / p.z, 0.0, -focal.x * slope.x / p.z),
-        DVec3::new(0.0, focal.y / p.z, -focal.y * slope.y / p.z),
-    ];
-    let factor = DMat3::from_mat4(camera.camera_from_world) * factor;
-    let rows = jacobian.map(|row| factor.transpose() * row);
-    let entry = |a: usize, b: usize| rows[a].dot(rows[b]);
-    DMat2::from_cols_array(&[entry(0, 0), entry(0, 1), entry(0, 1), entry(1, 1)])
+/// The covariance on the screen, Σ' = J W Σ Wᵀ Jᵀ + 0.3 I, by the rows of J W M: its determinant and its inverse as sums
+/// of squares, which do not cancel for needles.
+struct Footprint {
+    /// J W M, pixels.
+    rows: [DVec3; 2],
+    /// |r0 × r1|², the determinant without the low-pass (Cauchy and Binet).
+    bare: f64,
+    /// det Σ'.
+    determinant: f64,
+}
+
+impl Footprint {
+    /// Of Σ = M Mᵀ; the slope in J is limited to 1.3 half fields of view; `p` is the mean in camera coordinates.
+    fn new(factor: DMat3, p: DVec3, camera: &Camera) -> Self {
+        let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
+        let focal = DVec2::new(camera.fx, camera.fy);
+        let limit = 1.3 * size / (2.0 * focal);
+        let slope = (DVec2::new(p.x, p.y) / p.z).clamp(-limit, limit);
+        let jacobian = [
+            DVec3::new(focal.x / p.z, 0.0, -focal.x * slope.x / p.z),
+            DVec3::new(0.0, focal.y / p.z, -focal.y * slope.y / p.z),
+        ];
+        let factor = DMat3::from_mat4(camera.camera_from_world) * factor;
+        let rows = jacobian.map(|row| factor.transpose() * row);
+        let bare = rows[0].cross(rows[1]).length_squared();
+        let trace = rows[0].length_squared() + rows[1].length_squared();
+        Self { rows, bare, determinant: bare + LOW_PASS * trace + LOW_PASS * LOW_PASS }
+    }
+
+    /// −½ dᵀ Σ'⁻¹ d.
+    fn power(&self, d: DVec2) -> f64 {
+        let across = d.x * self.rows[1] - d.y * self.rows[0];
+        -0.5 * (across.length_squared() + LOW_PASS * d.length_squared()) / self.determinant
+    }
+
+    /// Of both axes, pixels².
+    fn variances(&self) -> DVec2 {
+        DVec2::new(self.rows[0].length_squared(), self.rows[1].length_squared()) + LOW_PASS
+    }
+
+    /// Three standard deviations of the longer axis, pixels.
+    fn radius(&self) -> f64 {
+        let variances = self.variances();
+        let middle = 0.5 * (variances.x + variances.y);
+        let largest = middle + (middle * middle - self.determinant).max(0.1).sqrt();
+        (3.0 * largest.sqrt()).ceil()
+    }
+
+    /// Of the opacity, for what the low-pass adds.
+    fn compensation(&self) -> f64 {
+        (self.bare / self.determinant).max(0.000_025).sqrt()
+    }
 }
 
 fn screen_mean(p: DVec3, camera: &Camera) -> DVec2 {
@@ -137,11 +169,8 @@ fn screen_mean(p: DVec3, camera: &Camera) -> DVec2 {
     ((ndc + 1.0) * size - 1.0) / 2.0
 }
 
-/// Pixels from and to of the tiles within three standard deviations of the longer axis.
-fn tiles_touched(mean: DVec2, covariance: DMat2) -> (DVec2, DVec2) {
-    let middle = 0.5 * (covariance.x_axis.x + covariance.y_axis.y);
-    let largest = middle + (middle * middle - covariance.determinant()).max(0.1).sqrt();
-    let radius = (3.0 * largest.sqrt()).ceil();
+/// Pixels from and to of the tiles within a radius.
+fn tiles_touched(mean: DVec2, radius: f64) -> (DVec2, DVec2) {
     let tile = TILE as f64;
     (((mean - radius) / tile).trunc() * tile, ((mean + radius + (tile - 1.0)) / tile).trunc() * tile)
 }
