@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use skinsplat::data::registry::Registry;
-use skinsplat::experiment::{FitOptions, Recipe};
-use skinsplat::fit::train::{Trainer, start};
+use skinsplat::datasets::Registry;
+use skinsplat_fit::train::{Trainer, start};
+use skinsplat_fit::{FitOptions, Recipe};
 
 fn steps(c: &mut Criterion) {
     let registry = Registry::embedded();

@@ -2,9 +2,9 @@
 #![allow(missing_docs, reason = "benchmark")]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use skinsplat::math::average::{Solver, Start, average_rotation, lanes, two_bones};
-use skinsplat::math::rotation::{normalize, quaternion_to_matrix_raw};
-use skinsplat::math::{Quaternion, Real, sh};
+use skinsplat_core::math::average::{Solver, Start, average_rotation, lanes, two_bones};
+use skinsplat_core::math::rotation::{normalize, quaternion_to_matrix_raw};
+use skinsplat_core::math::{Quaternion, Real, sh};
 use std::hint::black_box;
 
 /// A multiple of every lane count, small enough for the first-level cache.

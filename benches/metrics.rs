@@ -7,13 +7,13 @@
 )]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use skinsplat::data::lpips_weights::Networks;
-use skinsplat::metrics::lpips::OneFrame;
-use skinsplat::metrics::ssim::ssim_of_planes;
-use skinsplat::metrics::{
+use skinsplat_core::scene::{Image, Mask};
+use skinsplat_metrics::lpips::OneFrame;
+use skinsplat_metrics::lpips::weights::Networks;
+use skinsplat_metrics::ssim::ssim_of_planes;
+use skinsplat_metrics::{
     LpipsVariant, PerceptualDistance, Planes, Protocol, SsimVariant, Truth, all_variants,
 };
-use skinsplat::scene::{Image, Mask};
 use std::hint::black_box;
 
 const SIZE: usize = 512;

@@ -9,9 +9,9 @@ mod rig;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Mat3, Vec3};
-use skinsplat::scene::{AvatarGradient, Binding, Posed, PosedBody, PosedGradient};
-use skinsplat::strategy::needs::Needs;
-use skinsplat::strategy::{
+use skinsplat_core::scene::{AvatarGradient, Binding, Posed, PosedBody, PosedGradient};
+use skinsplat_posing::needs::Needs;
+use skinsplat_posing::{
     BoundAvatar, Choice, PRESETS, PoseBuffers, Strategy, Views, pose, pose_backward, pose_into,
 };
 use std::hint::black_box;

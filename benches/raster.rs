@@ -17,8 +17,8 @@ mod splat_scene;
 
 use criterion::Criterion;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use skinsplat::render::splat::{Derivatives, Phase, PhaseTimes, RenderSettings, Renderer, SimdLevel};
-use skinsplat::scene::{Camera, Gaussians, Image, Posed, PosedGradient, Rendered, RenderedGradient};
+use skinsplat_core::scene::{Camera, Gaussians, Image, Posed, PosedGradient, Rendered, RenderedGradient};
+use skinsplat_render::splat::{Derivatives, Phase, PhaseTimes, RenderSettings, Renderer, SimdLevel};
 use std::path::Path;
 use std::time::{Duration, Instant};
 

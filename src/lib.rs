@@ -23,15 +23,7 @@
 //! [`report`], [`trade`] → [`cli`].
 
 pub mod cli;
-pub mod data;
+pub mod datasets;
 pub mod experiment;
-pub mod fit;
-pub mod math;
-pub mod metrics;
-pub mod render;
 pub mod report;
 pub mod run;
-pub mod scene;
-pub mod strategy;
-pub mod stress;
-pub mod trade;

@@ -166,7 +166,7 @@ fn other_settings_redo_only_what_they_change() {
     let page = desk.read("run/tables.md");
     // Those of the table's own variants have a row already.
     let shown = ["lbs", "quaternion-average"];
-    for preset in skinsplat::strategy::PRESETS.iter().filter(|preset| !shown.contains(&preset.id)) {
+    for preset in skinsplat_posing::PRESETS.iter().filter(|preset| !shown.contains(&preset.id)) {
         assert!(page.contains(preset.title), "{} in {page}", preset.title);
     }
     desk.put("tiny.toml", TABLE.replace("avatar-v1", "hugs-full"));

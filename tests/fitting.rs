@@ -2,15 +2,15 @@
 //! an interruption, and it says what is wrong.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use skinsplat::data::registry::Registry;
-use skinsplat::data::{FrameGenerator, FrameRef, FrameSource, Sequence, Subject, Truth};
-use skinsplat::experiment::{FitOptions, RECIPES, Recipe};
-use skinsplat::fit::Error;
-use skinsplat::fit::texture::SAMPLES;
-use skinsplat::fit::train::{Trainer, start};
-use skinsplat::render::mesh::SamplePattern;
+use skinsplat::datasets::Registry;
 use skinsplat::run::held_out::held_out;
-use skinsplat::scene::{Avatar, Binding, Image, Mask};
+use skinsplat_core::scene::{Avatar, Binding, Image, Mask};
+use skinsplat_data::{FrameGenerator, FrameRef, FrameSource, Sequence, Subject, Truth};
+use skinsplat_fit::Error;
+use skinsplat_fit::texture::SAMPLES;
+use skinsplat_fit::train::{Trainer, start};
+use skinsplat_fit::{FitOptions, RECIPES, Recipe};
+use skinsplat_render::mesh::SamplePattern;
 use std::sync::Arc;
 
 /// The embedded subject, its first frames, at 96 pixels.

@@ -9,10 +9,11 @@ mod support;
 
 use files::Values;
 use proptest::prelude::*;
-use skinsplat::data::folder::Options;
-use skinsplat::data::ply::{self, Encoding, Metadata};
-use skinsplat::data::{Error, Registry, Subject, body, camera, frames, npy, poses};
-use skinsplat::scene::{Avatar, Binding, FaceBinding, Gaussians, Image, Mask, SkinWeights};
+use skinsplat::datasets::Registry;
+use skinsplat_core::scene::{Avatar, Binding, FaceBinding, Gaussians, Image, Mask, SkinWeights};
+use skinsplat_data::folder::Options;
+use skinsplat_data::ply::{self, Encoding, Metadata};
+use skinsplat_data::{Error, Subject, body, camera, frames, npy, poses};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::path::{Path, PathBuf};

@@ -10,10 +10,10 @@ mod support;
 use glam::DVec3;
 use program::Desk;
 use serde_json::Value;
-use skinsplat::data::frames::load_image;
-use skinsplat::data::{Capture, FrameRef, FrameSource, Sequence, Subject, ply};
-use skinsplat::scene::{Avatar, Binding, Camera, RestBody};
-use skinsplat::trade::{self, Cell, Options, SWEEPS, Stage, Trade};
+use skinsplat_core::scene::{Avatar, Binding, Camera, RestBody};
+use skinsplat_data::frames::load_image;
+use skinsplat_data::{Capture, FrameRef, FrameSource, Sequence, Subject, ply};
+use skinsplat_study::trade::{self, Cell, Options, SWEEPS, Stage, Trade};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -183,7 +183,7 @@ fn subject(body: &RestBody) -> Subject {
     let eye = DVec3::new(0.5, 0.3, 2.5);
     let camera = Camera::look_at(eye, DVec3::new(0.5, 0.0, 0.0), DVec3::Y, 60.0, 64, 48);
     let poses =
-        (0..3).map(|k| skinsplat::scene::Pose { translation: DVec3::ZERO, ..rig::bent(body, k, 0.5) });
+        (0..3).map(|k| skinsplat_core::scene::Pose { translation: DVec3::ZERO, ..rig::bent(body, k, 0.5) });
     let source = || FrameSource::Files { image: "none.png".into(), mask: None };
     let frame = |pose: usize| FrameRef { name: format!("{pose}"), pose, camera: 0, source: source() };
     let sequence = Sequence {

@@ -2,7 +2,7 @@
 //! vertices, 26,450 faces; 63 % of the vertices hang on one joint, 22 % on two, 5 % on three, 10 % on four.
 
 use glam::{DVec3, Vec3};
-use skinsplat::scene::{Avatar, Binding, FaceBinding, Gaussians, Pose, RestBody, Skeleton, SkinWeights};
+use skinsplat_core::scene::{Avatar, Binding, FaceBinding, Gaussians, Pose, RestBody, Skeleton, SkinWeights};
 
 /// SMPL's tree.
 const PARENTS: [usize; 24] =

@@ -2,10 +2,10 @@
 
 use super::output::{Format, emit, emit_json};
 use super::{Exit, selection::read_json};
-use crate::math::average::{Solver, Start, average, average_rotation, eigen::SymmetricEigen};
-use crate::math::{Matrix3, matrix3, rotation};
 use anyhow::{Result, bail};
 use serde::{Deserialize, Serialize};
+use skinsplat_core::math::average::{Solver, Start, average, average_rotation, eigen::SymmetricEigen};
+use skinsplat_core::math::{Matrix3, matrix3, rotation};
 use std::path::PathBuf;
 
 /// Blend rotations with every solver: check a shader or an engine against the exact answer.

@@ -1,11 +1,11 @@
 //! Which data a command looks at.
 
-use crate::data::Subject;
-use crate::data::folder::Options;
-use crate::data::registry::{Dataset, Registry};
+use crate::datasets::{Dataset, Registry};
 use crate::experiment::Experiment;
 use crate::run::{Library, LoadedDataset};
 use anyhow::{Result, bail};
+use skinsplat_data::Subject;
+use skinsplat_data::folder::Options;
 use std::path::{Path, PathBuf};
 
 /// Where data comes from.

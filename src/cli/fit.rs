@@ -4,10 +4,13 @@ use super::data::Data;
 use super::output::{Format, emit, emit_json};
 use super::progress::Watch;
 use super::{Context, Exit};
-use crate::data::{Sequence, Subject};
-use crate::experiment::{FitOptions, Profile, Recipe, evenly_spaced};
+use crate::experiment::Profile;
 use crate::run::fitting::{self, FitEvent, FitFiles, FitReport, HeldOut, Tests};
 use anyhow::{Context as _, Result, bail};
+use skinsplat_data::select::evenly_spaced;
+use skinsplat_data::{Sequence, Subject};
+use skinsplat_fit::FitOptions;
+use skinsplat_fit::Recipe;
 use std::path::PathBuf;
 
 /// Fit an avatar to a subject's training frames.

@@ -4,13 +4,13 @@ mod needs;
 
 use super::Exit;
 use super::output::emit;
-use crate::data::folder::{self, Options};
-use crate::data::npz::Archive;
-use crate::data::{self, Subject, body, camera, frames, ply, poses};
 use crate::report::Results;
 use crate::run::store;
-use crate::scene::{Avatar, Binding, Body, Image, Mask};
 use anyhow::{Context as _, Result, anyhow, bail};
+use skinsplat_core::scene::{Avatar, Binding, Body, Image, Mask};
+use skinsplat_data::folder::{self, Options};
+use skinsplat_data::npz::Archive;
+use skinsplat_data::{Subject, body, camera, frames, ply, poses};
 use std::path::{Path, PathBuf};
 
 /// Show what a file or folder holds, and what is wrong with it.
@@ -109,10 +109,10 @@ fn body_text(model: &Body) -> String {
 }
 
 fn clips_text(path: &Path) -> Result<String> {
-    let clip = |clip: &data::gltf::Clip| {
+    let clip = |clip: &skinsplat_data::gltf::Clip| {
         line(&format!("clip {}", clip.name), format!("{} keys", clip.key_times().len()))
     };
-    Ok(data::gltf::Rig::load(path)?.clips.iter().map(clip).collect())
+    Ok(skinsplat_data::gltf::Rig::load(path)?.clips.iter().map(clip).collect())
 }
 
 fn archive_text(path: &Path) -> Result<String> {
@@ -138,7 +138,7 @@ fn archive_text(path: &Path) -> Result<String> {
 
 fn cameras_text(path: &Path) -> Result<String> {
     let cameras = camera::load(path)?;
-    let describe = |(i, c): (usize, &crate::scene::Camera)| {
+    let describe = |(i, c): (usize, &skinsplat_core::scene::Camera)| {
         let centre = format!("centre ({:.1}, {:.1})", c.cx, c.cy);
         line(
             &format!("camera {i}"),
@@ -198,7 +198,7 @@ fn folder_text(path: &Path) -> Result<String> {
     if folder::is_subject(path) {
         return Ok(line("kind", "subject") + &subject_text(&Subject::load(path, &Options::default())?));
     }
-    let registry = data::Registry::scan(path)?;
+    let registry = crate::datasets::Registry::scan(path)?;
     let mut text = line("kind", "folder of subjects");
     for dataset in &registry.datasets {
         for subject in dataset.load(&Options::default())? {

@@ -4,10 +4,10 @@ use super::Exit;
 use super::data::Data;
 use super::output::emit;
 use super::planning::known_experiments;
-use crate::experiment::RECIPES;
-use crate::metrics::{MetricKind, PROTOCOLS, SsimVariant, VARIANT_IDS};
-use crate::strategy::PRESETS;
 use anyhow::Result;
+use skinsplat_fit::RECIPES;
+use skinsplat_metrics::{MetricKind, PROTOCOLS, SsimVariant, VARIANT_IDS};
+use skinsplat_posing::PRESETS;
 
 /// List experiments, datasets, strategies, recipes, protocols or metrics.
 #[derive(Debug, clap::Args)]
@@ -53,7 +53,7 @@ impl List {
 
     fn datasets(&self) -> Result<Vec<[String; 2]>> {
         let registry = self.data.registry()?;
-        let row = |d: &crate::data::registry::Dataset| {
+        let row = |d: &crate::datasets::Dataset| {
             let here = match (d.is_available(), &d.path) {
                 (true, _) => "available".to_owned(),
                 (false, Some(path)) => format!("not available: put it in {}", path.display()),

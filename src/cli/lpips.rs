@@ -1,7 +1,11 @@
 //! The weights of LPIPS on the command line.
 
-use crate::data::lpips_weights::Networks;
-use anyhow::Result;
+use anyhow::{Context as _, Result};
+use skinsplat_data::{error::read_bytes, key::sha256_hex};
+use skinsplat_metrics::lpips::{
+    Network,
+    weights::{GivenNetwork, Networks},
+};
 use std::path::PathBuf;
 
 /// Networks for LPIPS.
@@ -15,6 +19,11 @@ pub(super) struct LpipsWeights {
 impl LpipsWeights {
     /// The networks at hand. A file is read now; what is built in, when it is needed.
     pub(super) fn networks(&self) -> Result<Networks> {
-        Ok(Networks::new(self.file.as_deref())?)
+        let read = |path: &PathBuf| -> Result<GivenNetwork> {
+            let bytes = read_bytes(path, "LPIPS weights", "a safetensors file with the weights of LPIPS")?;
+            let network = Network::from_safetensors(&bytes).with_context(|| path.display().to_string())?;
+            Ok(GivenNetwork { network, digest: sha256_hex(&bytes) })
+        };
+        Ok(Networks::new(self.file.as_ref().map(read).transpose()?))
     }
 }

@@ -2,10 +2,10 @@
 
 use super::data::Data;
 use super::lpips::LpipsWeights;
-use crate::data::lpips_weights::Networks;
 use crate::experiment::{self, Experiment, GivenWeights, Options, Plan, Profile, Subset};
 use crate::run::Library;
 use anyhow::{Result, bail};
+use skinsplat_metrics::lpips::weights::Networks;
 use std::path::{Path, PathBuf};
 
 /// What to plan.

@@ -1,9 +1,9 @@
 //! An avatar, a body, a frame of a pose track and a strategy: the arguments of `render` and `skin`.
 
-use crate::data::{body, ply, poses};
-use crate::scene::{Avatar, Binding, Body, Camera, Pose, Posed, PosedBody, RestBody};
-use crate::strategy::{self, BoundAvatar, Choice, JointLift, PoseBuffers, Resolved, Strategy, Views};
 use anyhow::{Context as _, Result, bail};
+use skinsplat_core::scene::{Avatar, Binding, Body, Camera, Pose, Posed, PosedBody, RestBody};
+use skinsplat_data::{body, ply, poses};
+use skinsplat_posing::{BoundAvatar, Choice, JointLift, PoseBuffers, Resolved, Strategy, Views};
 use std::path::{Path, PathBuf};
 
 /// Which pose to take, and how to rotate the Gaussians.
@@ -110,12 +110,12 @@ impl Subject {
         let body = PosedBody::new(rest, pose)?;
         let Some(camera) = camera else {
             let resolved = choice.resolve(&bound, &body, Views::Any)?;
-            return use_posed(&strategy::pose(&bound, &body, &resolved.strategy)?, Some(&resolved));
+            return use_posed(&skinsplat_posing::pose(&bound, &body, &resolved.strategy)?, Some(&resolved));
         };
         let bound = bound.without_zero_bands();
         let resolved = choice.resolve(&bound, &body, Views::Few(1))?;
         let mut buffers = PoseBuffers::default();
-        let posed = strategy::pose_seen(&bound, &body, &resolved.strategy, camera, &mut buffers)?;
+        let posed = skinsplat_posing::pose_seen(&bound, &body, &resolved.strategy, camera, &mut buffers)?;
         use_posed(&posed, Some(&resolved))
     }
 
@@ -135,13 +135,19 @@ impl Subject {
         let body = PosedBody::new(rest, pose)?;
         let lift = JointLift::next(lift.as_ref(), &body);
         let bound = BoundAvatar::new(&self.avatar, rest)?;
-        use_posed(&strategy::pose_lifted(&bound, &body, strategy, &lift, &mut PoseBuffers::default())?)
+        use_posed(&skinsplat_posing::pose_lifted(
+            &bound,
+            &body,
+            strategy,
+            &lift,
+            &mut PoseBuffers::default(),
+        )?)
     }
 }
 
 /// What `auto` picked, for a note; none for a strategy that was given.
 pub(super) fn picked(choice: Choice, resolved: Option<&Resolved>) -> Option<String> {
     let Resolved { strategy, bound } = resolved?;
-    let degrees = strategy::needs::Degrees((*bound)?);
+    let degrees = skinsplat_posing::needs::Degrees((*bound)?);
     Some(format!("{choice}: {strategy}, within {degrees} of the exact average"))
 }

@@ -1,8 +1,8 @@
 //! Progress on a terminal, and nowhere else.
 
-use crate::fit::train::Step;
 use crate::run::Event;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use skinsplat_fit::train::Step;
 
 /// What a single fit is called.
 const FITTING: &str = "fitting";

@@ -2,9 +2,9 @@
 
 use super::posing::{Posing, picked};
 use super::{Context, Exit, selection::parse_colour};
-use crate::data::{camera, frames};
-use crate::render::splat::{self, RenderSettings};
 use anyhow::{Result, bail};
+use skinsplat_data::{camera, frames};
+use skinsplat_render::splat::{self, RenderSettings};
 use std::path::PathBuf;
 
 /// Render a 3DGS PLY, posed or as it stands.

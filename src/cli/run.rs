@@ -3,7 +3,6 @@
 use super::output::emit;
 use super::planning::{Planned, Planning};
 use super::{Context, Exit, progress::Watch};
-use crate::data::atomic;
 use crate::experiment::{Records, Shard};
 use crate::report;
 use crate::run::gallery;
@@ -11,6 +10,7 @@ use crate::run::provenance::Provenance;
 use crate::run::store::{self, FILE_NAME, Store};
 use crate::run::{self, Error};
 use anyhow::{Context as _, Result};
+use skinsplat_data::atomic;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;

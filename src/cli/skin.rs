@@ -2,10 +2,10 @@
 
 use super::posing::{Posing, picked};
 use super::{Context, Exit};
-use crate::data::ply;
-use crate::scene::{Avatar, Binding};
-use crate::strategy::{Choice, Resolved, RotationChoice, Strategy, bake};
 use anyhow::{Result, bail};
+use skinsplat_core::scene::{Avatar, Binding};
+use skinsplat_data::ply;
+use skinsplat_posing::{Choice, Resolved, RotationChoice, Strategy, bake};
 use std::path::PathBuf;
 
 /// Pose an avatar and write a plain static 3DGS PLY.

@@ -3,9 +3,9 @@
 use super::output::emit;
 use super::progress::Watch;
 use super::{Context, Exit};
-use crate::data::{atomic, frames};
-use crate::stress::{Report, Section};
 use anyhow::{Context as _, Result};
+use skinsplat_data::{atomic, frames};
+use skinsplat_study::stress::{Report, Section};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

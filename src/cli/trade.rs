@@ -4,11 +4,11 @@ use super::data::Data;
 use super::output::emit;
 use super::progress::Watch;
 use super::{Context, Exit};
-use crate::data::{Subject, atomic, ply};
-use crate::experiment::recipe::Placement;
-use crate::report::plot::{png, svg};
-use crate::trade::{self, Options, SWEEPS, Stage, Sweep, Trade, savings};
 use anyhow::{Context as _, Result, bail};
+use skinsplat_data::{Subject, atomic, ply};
+use skinsplat_fit::recipe::Placement;
+use skinsplat_plot::{png, svg};
+use skinsplat_study::trade::{self, Options, SWEEPS, Stage, Sweep, Trade, savings};
 use std::io::Write;
 use std::path::PathBuf;
 

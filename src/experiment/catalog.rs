@@ -1,7 +1,7 @@
 //! Protocols and strategies by their specs: the one place where experiments meet the layers that define them.
 
-use crate::metrics::{MetricsError, Protocol};
-use crate::strategy::{Choice, Strategy, StrategyError};
+use skinsplat_metrics::{MetricsError, Protocol};
+use skinsplat_posing::{Choice, Strategy, StrategyError};
 
 /// The protocol of a spec.
 ///

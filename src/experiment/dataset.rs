@@ -1,7 +1,7 @@
 //! What the planner knows about data: names, counts and digests, no pixels.
 
-use crate::data::Capture;
 use serde::{Deserialize, Serialize};
+use skinsplat_data::Capture;
 
 /// The part that a sequence plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

@@ -6,35 +6,32 @@
 //! depend on. A [`FrameRecord`] is what a job leaves behind. Nothing in this layer renders, and nothing reads a file
 //! but [`Experiment::load`] and [`Experiment::load_folder`].
 //!
-//! A further table is a further TOML file; a further column is one arm in [`MetricKind`](crate::metrics::MetricKind).
+//! A further table is a further TOML file; a further column is one arm in [`MetricKind`](skinsplat_metrics::MetricKind).
 
 mod catalog;
 mod dataset;
 mod embedded;
 mod error;
-mod key;
 mod paper;
 mod plan;
 mod profile;
-pub mod recipe;
 mod record;
 mod rows;
 mod seeds;
 mod shard;
 mod spec;
 mod validate;
+mod versions;
 
-pub use crate::data::Capture;
 pub use dataset::{AvatarFile, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
 pub use embedded::{EMBEDDED, FURTHER};
 pub use error::Error;
-pub use key::{CodeVersions, canonical_json, content_key};
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
 pub use plan::{AvatarBuild, Job, JobVariant, Plan, PlannedFit, PlannedTable, plan};
-pub use profile::{GivenWeights, Options, Profile, Subset, evenly_spaced};
-pub use recipe::{FitOptions, RECIPES, Recipe};
+pub use profile::{GivenWeights, Options, Profile, Subset};
 pub use record::{FrameRecord, Outcome, Records, Seconds};
 pub use rows::{DataRow, Source};
 pub use seeds::Replicate;
 pub use shard::Shard;
 pub use spec::{ADDED_VARIANT, AvatarRecipe, Average, Column, Experiment, Layout, StandIn, Variant};
+pub use versions::CodeVersions;

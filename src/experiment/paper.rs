@@ -1,8 +1,8 @@
 //! What the paper printed, digit by digit, and how its comparisons split the data.
 
 use super::{FrameInfo, Role};
-use crate::metrics::MetricKind;
 use serde::{Deserialize, Serialize};
+use skinsplat_metrics::MetricKind;
 use std::collections::BTreeMap;
 use std::fmt;
 

@@ -1,15 +1,18 @@
 //! From experiments and data to jobs: pure, no file is opened.
 
-use super::recipe::Surface;
 use super::rows::{DataRow, Source, rows_of};
 use super::{
-    AvatarRecipe, CodeVersions, Dataset, Error, Experiment, FitOptions, Options, Recipe, SequenceInfo, Shard,
-    SubjectInfo, Variant, catalog, content_key,
+    AvatarRecipe, CodeVersions, Dataset, Error, Experiment, Options, SequenceInfo, Shard, SubjectInfo,
+    Variant, catalog,
 };
-use crate::metrics::{MetricKind, Protocol, ProtocolId};
-use crate::strategy::Choice;
 use serde::Serialize;
 use serde_json::{Value, json};
+use skinsplat_data::key::content_key;
+use skinsplat_fit::FitOptions;
+use skinsplat_fit::Recipe;
+use skinsplat_fit::recipe::Surface;
+use skinsplat_metrics::{MetricKind, Protocol, ProtocolId};
+use skinsplat_posing::Choice;
 use std::collections::BTreeSet;
 
 /// Everything that a run has to do and a report has to show, as plain data.

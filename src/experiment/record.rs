@@ -1,7 +1,7 @@
 //! What a job leaves behind: one record per frame and variant.
 
-use crate::metrics::FrameScore;
 use serde::{Deserialize, Serialize};
+use skinsplat_metrics::FrameScore;
 use std::collections::BTreeMap;
 
 /// The score of one frame, rendered in one way, or why there is none.

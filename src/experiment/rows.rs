@@ -1,9 +1,8 @@
 //! Which sequences a table is made from, and which of their frames.
 
-use super::{
-    Dataset, Experiment, FrameInfo, Options, Role, SequenceInfo, Split, StandIn, SubjectInfo, evenly_spaced,
-};
+use super::{Dataset, Experiment, FrameInfo, Options, Role, SequenceInfo, Split, StandIn, SubjectInfo};
 use serde::{Deserialize, Serialize};
+use skinsplat_data::select::evenly_spaced;
 
 /// Where the numbers of a table come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

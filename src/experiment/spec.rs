@@ -1,9 +1,10 @@
 //! The experiment file: one table, described as data.
 
-use super::{Capture, EMBEDDED, Error, FURTHER, Paper, Replicate, Source, Split, catalog, seeds, validate};
-use crate::metrics::MetricKind;
-use crate::strategy::PRESETS;
+use super::{EMBEDDED, Error, FURTHER, Paper, Replicate, Source, Split, catalog, seeds, validate};
 use serde::{Deserialize, Serialize};
+use skinsplat_data::Capture;
+use skinsplat_metrics::MetricKind;
+use skinsplat_posing::PRESETS;
 use std::path::Path;
 
 /// How the ids of variants begin that [`Experiment::with_all_strategies`] adds.

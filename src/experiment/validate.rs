@@ -1,6 +1,7 @@
 //! Checks of an experiment that its types cannot make.
 
-use super::{AvatarRecipe, Error, Experiment, Paper, Recipe, Role, Split, Variant, catalog, seeds};
+use super::{AvatarRecipe, Error, Experiment, Paper, Role, Split, Variant, catalog, seeds};
+use skinsplat_fit::Recipe;
 use std::collections::BTreeSet;
 
 /// Checks one experiment.

@@ -8,7 +8,7 @@ use super::results::{FrameResult, SequenceResults, VariantResults};
 use super::stats::paired;
 use super::table::{Cell, Comparison, Content, MetricDifference, RowKind, Table};
 use crate::experiment::{Column, Experiment, Options, PlannedTable, Source};
-use crate::metrics::MetricKind;
+use skinsplat_metrics::MetricKind;
 
 /// Failed or missing frames that a footnote names; the others are counted.
 const NAMED_FRAMES: usize = 3;

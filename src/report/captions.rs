@@ -1,9 +1,8 @@
 //! What a table says about where its numbers come from.
 
 use super::results::SequenceResults;
-use crate::experiment::{
-    AvatarRecipe, Capture, Experiment, Options, PlannedTable, Profile, Source, Subset, Variant,
-};
+use crate::experiment::{AvatarRecipe, Experiment, Options, PlannedTable, Profile, Source, Subset, Variant};
+use skinsplat_data::Capture;
 
 /// The table's caption: of its own data, or the stand-in's, which does not name that data.
 pub(super) fn caption(experiment: &Experiment, source: Source) -> String {

@@ -5,7 +5,7 @@ use super::{Error, build};
 use crate::experiment::{
     CodeVersions, DataRow, Experiment, Job, Outcome, Plan, PlannedTable, Records, Variant,
 };
-use crate::metrics::{FrameScore, Protocol};
+use skinsplat_metrics::{FrameScore, Protocol};
 
 /// The results of a plan: pure, and the same for the same records in whatever order they were made.
 ///

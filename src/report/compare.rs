@@ -1,8 +1,8 @@
 //! Two results documents: what moved, and whether for the worse.
 
 use super::results::{FrameResult, Results, VariantResults};
-use crate::metrics::MetricKind;
 use serde::{Deserialize, Serialize};
+use skinsplat_metrics::MetricKind;
 use std::collections::BTreeMap;
 
 /// How far a number may move without counting.

@@ -1,8 +1,8 @@
 //! How fits went, as CSV and as plots.
 
-use super::plot::{Lines, PlotError, Series, svg};
 use crate::experiment::Experiment;
 use crate::run::curves::{Curve, CurvePoint};
+use skinsplat_plot::{Lines, PlotError, Series, svg};
 use std::collections::BTreeMap;
 
 /// A line per point, a column per number; a field without a number is empty.

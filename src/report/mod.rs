@@ -21,7 +21,6 @@ mod layout;
 mod markdown;
 mod page;
 mod paper;
-pub mod plot;
 mod replicates;
 mod results;
 pub mod stats;
@@ -36,7 +35,7 @@ pub use page::page;
 pub use results::{FrameResult, Results, SCHEMA, SequenceResults, TableResults, VariantResults};
 pub use table::{Cell, Comparison, Content, MetricDifference, Row, RowKind, Table, TableColumn};
 
-use crate::metrics::MetricsError;
+use skinsplat_metrics::MetricsError;
 
 /// Records that do not belong to the plan.
 #[derive(Debug, thiserror::Error)]

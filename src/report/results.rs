@@ -3,8 +3,8 @@
 
 use super::table::Table;
 use crate::experiment::{AvatarRecipe, CodeVersions, Options};
-use crate::metrics::{FrameScore, MetricKind, ProtocolId, Summary};
 use serde::{Deserialize, Serialize};
+use skinsplat_metrics::{FrameScore, MetricKind, ProtocolId, Summary};
 
 /// Version of the document's format.
 pub const SCHEMA: u32 = 1;

@@ -5,8 +5,8 @@
 //! 1992), of length `round(n^(1/3))`, at least 2 where n allows. Both variants share the drawn frames: the differences
 //! are paired. The generator is SplitMix64 with a fixed seed, so the same frames give the same interval everywhere.
 
-use crate::math::random::SplitMix64;
 use serde::{Deserialize, Serialize};
+use skinsplat_core::math::random::SplitMix64;
 
 /// Resamples behind an interval.
 pub const RESAMPLES: usize = 2000;

@@ -2,8 +2,8 @@
 
 use super::stats::Paired;
 use crate::experiment::Source;
-use crate::metrics::MetricKind;
 use serde::{Deserialize, Serialize};
+use skinsplat_metrics::MetricKind;
 
 /// A table, ready to be written in any format.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -4,11 +4,11 @@ use super::curve_frames::CurveFrames;
 use super::fitting::{self, FitEvent, FitFiles, Tests};
 use super::textured::TexturedFiles;
 use super::{Error, Event, Library};
-use crate::data::{Sequence, ply};
 use crate::experiment::{AvatarBuild, AvatarRecipe, PlannedFit};
-use crate::fit::surface::{BindTo, Placement, SurfaceInit, surface_init};
-use crate::fit::texture::{TextureInit, TexturedBody, gather_texture};
-use crate::strategy::BoundAvatar;
+use skinsplat_data::{Sequence, ply};
+use skinsplat_fit::surface::{BindTo, Placement, SurfaceInit, surface_init};
+use skinsplat_fit::texture::{TextureInit, TexturedBody, gather_texture};
+use skinsplat_posing::BoundAvatar;
 use std::path::{Path, PathBuf};
 
 /// An avatar that is ready to be posed.

@@ -1,8 +1,9 @@
 //! Held-out frames that say on the way of a fit how it does: a few, kept in memory for all fits of a subject.
 
 use super::{Error, Library};
-use crate::data::Sequence;
-use crate::experiment::{AvatarBuild, Job, Plan, evenly_spaced};
+use crate::experiment::{AvatarBuild, Job, Plan};
+use skinsplat_data::Sequence;
+use skinsplat_data::select::evenly_spaced;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! What can stop a run.
 
 use super::store;
-use crate::{data, fit, metrics, scene, strategy};
+
 use std::path::PathBuf;
 
 /// A run, or one of its frames, that cannot go on.
@@ -10,19 +10,19 @@ use std::path::PathBuf;
 pub enum Error {
     /// Data that cannot be read.
     #[error(transparent)]
-    Data(#[from] data::Error),
+    Data(#[from] skinsplat_data::Error),
     /// An avatar that cannot be made.
     #[error(transparent)]
-    Fit(#[from] fit::Error),
+    Fit(#[from] skinsplat_fit::Error),
     /// An avatar that cannot be posed.
     #[error(transparent)]
-    Strategy(#[from] strategy::StrategyError),
+    Strategy(#[from] skinsplat_posing::StrategyError),
     /// A pose or an image that breaks an invariant.
     #[error(transparent)]
-    Scene(#[from] scene::SceneError),
+    Scene(#[from] skinsplat_core::scene::SceneError),
     /// An image that cannot be scored.
     #[error(transparent)]
-    Metrics(#[from] metrics::MetricsError),
+    Metrics(#[from] skinsplat_metrics::MetricsError),
     /// The results store.
     #[error(transparent)]
     Store(#[from] store::Error),

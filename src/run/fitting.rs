@@ -4,11 +4,12 @@
 use super::Error;
 use super::held_out::held_out;
 use super::textured::TexturedFiles;
-use crate::data::{Sequence, atomic, ply};
-use crate::experiment::{CodeVersions, FitOptions};
-use crate::fit::train::{self, Checkpoint, Fitted, Step, Trainer};
-use crate::scene::Avatar;
+use crate::experiment::CodeVersions;
 use serde::{Deserialize, Serialize};
+use skinsplat_core::scene::Avatar;
+use skinsplat_data::{Sequence, atomic, ply};
+use skinsplat_fit::FitOptions;
+use skinsplat_fit::train::{self, Checkpoint, Fitted, Step, Trainer};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

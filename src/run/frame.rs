@@ -2,14 +2,14 @@
 
 use super::Error;
 use super::avatars::Prepared;
-use crate::data::{Sequence, Truth};
 use crate::experiment::{Job, JobVariant, Seconds};
-use crate::fit::texture::{SAMPLES, TexturedBody};
-use crate::metrics::Protocol;
-use crate::render::mesh::SamplePattern;
-use crate::render::splat::{RenderSettings, Renderer};
-use crate::scene::{Camera, Image, Mask, Pose, Posed, PosedBody, Rendered};
-use crate::strategy::{self, Choice, PoseBuffers, Views};
+use skinsplat_core::scene::{Camera, Image, Mask, Pose, Posed, PosedBody, Rendered};
+use skinsplat_data::{Sequence, Truth};
+use skinsplat_fit::texture::{SAMPLES, TexturedBody};
+use skinsplat_metrics::Protocol;
+use skinsplat_posing::{Choice, PoseBuffers, Views};
+use skinsplat_render::mesh::SamplePattern;
+use skinsplat_render::splat::{RenderSettings, Renderer};
 use std::time::Instant;
 
 /// A frame, loaded.
@@ -51,10 +51,15 @@ impl<'a> Frame<'a> {
         };
         let choice: Choice = variant.strategy.as_deref().unwrap_or_default().parse()?;
         let start = Instant::now();
-        let strategy::Resolved { strategy, bound: proved } =
+        let skinsplat_posing::Resolved { strategy, bound: proved } =
             choice.resolve(bound, &self.body, Views::Few(1))?;
-        let posed =
-            strategy::pose_seen(bound, &self.body, &strategy, self.camera, &mut PoseBuffers::default())?;
+        let posed = skinsplat_posing::pose_seen(
+            bound,
+            &self.body,
+            &strategy,
+            self.camera,
+            &mut PoseBuffers::default(),
+        )?;
         seconds.pose = start.elapsed().as_secs_f64();
         let settings = RenderSettings { background, antialiased: job.antialiased };
         let start = Instant::now();

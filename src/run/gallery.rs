@@ -7,10 +7,10 @@ use super::avatars::Prepared;
 use super::execute::{prepare_avatars, test_sequence};
 use super::frame::{Frame, background};
 use super::{Error, Event, Library};
-use crate::data::frames::save_png;
 use crate::experiment::{Job, Outcome, Plan, Records, Seconds};
-use crate::render::splat::Renderer;
-use crate::scene::{Image, Mask, SceneError};
+use skinsplat_core::scene::{Image, Mask, SceneError};
+use skinsplat_data::frames::save_png;
+use skinsplat_render::splat::Renderer;
 use std::fmt::Write;
 use std::path::Path;
 

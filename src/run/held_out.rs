@@ -3,14 +3,14 @@
 use super::Error;
 use super::fitting::HeldOut;
 use super::frame::together;
-use crate::data::Sequence;
-use crate::fit::texture::TexturedBody;
-use crate::fit::train::Fitted;
-use crate::metrics::{self, Protocol, Wanted};
-use crate::render::splat::{RenderSettings, Renderer};
-use crate::scene::{PosedBody, RestBody};
-use crate::strategy::{BoundAvatar, PoseBuffers, Strategy, pose_seen};
 use rayon::prelude::*;
+use skinsplat_core::scene::{PosedBody, RestBody};
+use skinsplat_data::Sequence;
+use skinsplat_fit::texture::TexturedBody;
+use skinsplat_fit::train::Fitted;
+use skinsplat_metrics::{Protocol, Wanted};
+use skinsplat_posing::{BoundAvatar, PoseBuffers, Strategy, pose_seen};
+use skinsplat_render::splat::{RenderSettings, Renderer};
 use std::sync::Arc;
 
 /// Poses, renders and scores an avatar on every frame of some sequences, by the default protocol. Binding it costs more than
@@ -69,7 +69,7 @@ fn of_sequence(
             None => renderer.render(&posed, camera, &settings).image,
             Some(mesh) => together(renderer, &posed, (mesh, pose), camera, &settings)?.image,
         };
-        let truth = metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha };
+        let truth = skinsplat_metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha };
         Ok(protocol.score_with(&image, truth, Wanted { ssim: asked.ssim, lpips: None })?)
     };
     let frames = (0..sequence.frames.len()).into_par_iter();

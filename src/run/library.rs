@@ -1,9 +1,9 @@
 //! The data at hand: loaded subjects, and what the planner needs to know about them.
 
 use super::Error;
-use crate::data::{self, Sequence, Subject};
 use crate::experiment::{Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
 use rayon::prelude::*;
+use skinsplat_data::{Sequence, Subject};
 
 /// A data set whose subjects are loaded; no image is decoded.
 #[derive(Debug)]
@@ -53,16 +53,17 @@ impl Library {
     }
 }
 
-fn describe_subject(subject: &Subject) -> Result<SubjectInfo, data::Error> {
+fn describe_subject(subject: &Subject) -> Result<SubjectInfo, skinsplat_data::Error> {
     let roles =
         subject.train.iter().map(|s| (s, Role::Train)).chain(subject.test.iter().map(|s| (s, Role::Test)));
     let sequences: Vec<(&Sequence, Role)> = roles.collect();
     let describe = |&(sequence, role): &(&Sequence, Role)| {
-        let frame = |f: &data::FrameRef| FrameInfo { name: f.name.clone(), time: f.pose, camera: f.camera };
+        let frame =
+            |f: &skinsplat_data::FrameRef| FrameInfo { name: f.name.clone(), time: f.pose, camera: f.camera };
         let digest = sequence.digest()?;
         let frames = sequence.frames.iter().map(frame).collect();
         Ok(SequenceInfo { id: sequence.id.clone(), role, digest, frames })
     };
-    let sequences = sequences.par_iter().map(describe).collect::<Result<_, data::Error>>()?;
+    let sequences = sequences.par_iter().map(describe).collect::<Result<_, skinsplat_data::Error>>()?;
     Ok(SubjectInfo { id: subject.id.clone(), capture: subject.capture, sequences, avatars: Vec::new() })
 }

@@ -1,11 +1,11 @@
 //! Textured bodies as files: the texture as an image, the vertices beside it.
 
 use super::Error;
-use crate::data::{frames, npy};
-use crate::fit::texture::TexturedBody;
-use crate::render::mesh::Texture;
-use crate::scene::RestBody;
 use glam::DVec3;
+use skinsplat_core::scene::RestBody;
+use skinsplat_data::{frames, npy};
+use skinsplat_fit::texture::TexturedBody;
+use skinsplat_render::mesh::Texture;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -81,11 +81,11 @@ fn zero_area_faces_are_posed() {
     write_npz(&desk.path("flat.npz"), &flat);
     let listing = desk.ok(args!["inspect", "flat.npz"]);
     assert!(listing.contains("zero-area faces      2"), "{listing}");
-    for preset in skinsplat::strategy::PRESETS {
+    for preset in skinsplat_posing::PRESETS {
         let mut arguments = args!["skin", "avatar.ply", "--out", "out.ply", "--body", "flat.npz"];
         arguments.extend(args!["--poses", "poses.npz", "--frame", "1", "--strategy", preset.id]);
         desk.ok(arguments);
-        let posed = skinsplat::data::ply::read_avatar(&desk.path("out.ply")).unwrap();
+        let posed = skinsplat_data::ply::read_avatar(&desk.path("out.ply")).unwrap();
         assert_eq!(posed.gaussians.len(), 6, "{}", preset.id);
         assert!(posed.gaussians.rotations.iter().flatten().all(|c| c.is_finite()), "{}", preset.id);
     }

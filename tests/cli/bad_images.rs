@@ -55,8 +55,8 @@ fn images_that_do_not_go_together() {
     let other = fixture("metrics/png/tiny_11x11_a.png");
     let sizes = ["rocket_67x53_noise_a.png", "tiny_11x11_a.png", "67x53", "11x11"];
     desk.run(args!["score", good, other]).refuses(&sizes, "sizes");
-    let mask = skinsplat::scene::Mask::new(11, 11, vec![1.0; 121]).unwrap();
-    skinsplat::data::frames::save_mask_png(&desk.path("mask.png"), &mask).unwrap();
+    let mask = skinsplat_core::scene::Mask::new(11, 11, vec![1.0; 121]).unwrap();
+    skinsplat_data::frames::save_mask_png(&desk.path("mask.png"), &mask).unwrap();
     desk.run(args!["score", good, good, "--mask", "mask.png"]).refuses(&["67x53", "11x11"], "mask's size");
     desk.run(args!["score", good, good, "--mask", good])
         .refuses(&["rocket_67x53", "grey mask"], "a colour mask");
@@ -76,7 +76,7 @@ fn images_that_do_not_go_together() {
 fn arrays_that_are_no_images() {
     let desk = Desk::new();
     let write = |shape: &[usize], values: Vec<f32>| {
-        skinsplat::data::npy::write_f32(&desk.path("bad.npy"), shape, values).unwrap();
+        skinsplat_data::npy::write_f32(&desk.path("bad.npy"), shape, values).unwrap();
     };
     let inspect = |parts: &[&str], what: &str| desk.run(args!["inspect", "bad.npy"]).refuses(parts, what);
     write(&[4, 4, 3], vec![0.5; 48]);

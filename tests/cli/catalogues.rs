@@ -77,8 +77,8 @@ fn list_names_everything_that_can_be_chosen() {
     for (what, ids) in [
         ("experiments", vec!["table1", "table6"]),
         ("datasets", vec!["synthetic", "snapshot_ava", "neuman"]),
-        ("strategies", skinsplat::strategy::PRESETS.iter().map(|p| p.id).collect()),
-        ("protocols", skinsplat::metrics::PROTOCOLS.iter().map(|p| p.id.as_str()).collect()),
+        ("strategies", skinsplat_posing::PRESETS.iter().map(|p| p.id).collect()),
+        ("protocols", skinsplat_metrics::PROTOCOLS.iter().map(|p| p.id.as_str()).collect()),
         ("metrics", vec!["psnr", "ssim_zero_pad", "psnr_mean_of_channels_mask"]),
     ] {
         let text = desk.ok(args!["list", what]);
@@ -93,12 +93,8 @@ fn list_names_everything_that_can_be_chosen() {
     assert_eq!(here.lines().count(), 3, "{here}");
     assert!(here.lines().all(|line| line.ends_with("available")), "{here}");
     // What is listed as a strategy can be asked for by that spec.
-    for preset in skinsplat::strategy::PRESETS {
-        assert!(
-            preset.strategy.to_string().parse::<skinsplat::strategy::Strategy>().is_ok(),
-            "{}",
-            preset.id
-        );
+    for preset in skinsplat_posing::PRESETS {
+        assert!(preset.strategy.to_string().parse::<skinsplat_posing::Strategy>().is_ok(), "{}", preset.id);
     }
 }
 

@@ -4,8 +4,8 @@ use crate::args;
 use crate::program::Desk;
 use crate::support::{fixture, json};
 use serde_json::Value;
-use skinsplat::data::lpips_weights::ALEX_BYTES;
-use skinsplat::metrics::{LpipsNet, PROTOCOLS};
+use skinsplat_lpips_alex::SAFETENSORS as ALEX_BYTES;
+use skinsplat_metrics::{LpipsNet, PROTOCOLS};
 use std::ffi::OsString;
 
 const PAIR: [&str; 2] = ["metrics/png/chelsea_128x192_blur_a.png", "metrics/png/chelsea_128x192_blur_b.png"];

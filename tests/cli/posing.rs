@@ -5,8 +5,8 @@ use crate::made_up;
 use crate::program::Desk;
 use crate::rendering::differences;
 use crate::support::data;
-use skinsplat::data::ply;
-use skinsplat::scene::Binding;
+use skinsplat_core::scene::Binding;
+use skinsplat_data::ply;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -123,7 +123,7 @@ fn a_strategy_that_no_static_file_can_hold_says_so() {
 #[test]
 fn every_preset_poses_a_small_avatar() {
     let desk = made_up::desk();
-    for preset in skinsplat::strategy::PRESETS {
+    for preset in skinsplat_posing::PRESETS {
         let posing =
             args!["--body", "body.npz", "--poses", "poses.npz", "--frame", "1", "--strategy", preset.id];
         let mut skin = args!["skin", "avatar.ply", "--out", "posed.ply"];

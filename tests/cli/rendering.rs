@@ -3,7 +3,7 @@
 use crate::args;
 use crate::program::Desk;
 use crate::support::fixture;
-use skinsplat::data::frames::load_image;
+use skinsplat_data::frames::load_image;
 use std::path::Path;
 
 /// Absolute differences of all values, ascending.

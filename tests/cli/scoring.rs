@@ -106,11 +106,11 @@ fn masks_add_variants() {
     let desk = Desk::new();
     let [a, b] = ["a", "b"].map(|side| fixture(&format!("metrics/png/checker_64x72_inverted_{side}.png")));
     let plain = score(&desk, args![a, b]);
-    let size = skinsplat::data::frames::load_image(&a).unwrap().0;
+    let size = skinsplat_data::frames::load_image(&a).unwrap().0;
     let half: Vec<f32> =
         (0..size.pixels().len()).map(|i| f32::from(i % size.width() < size.width() / 2)).collect();
-    let mask = skinsplat::scene::Mask::new(size.width(), size.height(), half).unwrap();
-    skinsplat::data::frames::save_mask_png(&desk.path("mask.png"), &mask).unwrap();
+    let mask = skinsplat_core::scene::Mask::new(size.width(), size.height(), half).unwrap();
+    skinsplat_data::frames::save_mask_png(&desk.path("mask.png"), &mask).unwrap();
     let masked = score(&desk, args![a, b, "--mask", "mask.png"]);
     for (name, value) in plain.as_object().unwrap() {
         assert_eq!(&masked[name], value, "{name}");
@@ -119,6 +119,6 @@ fn masks_add_variants() {
     assert_eq!(masked["mse_mask"], 1.0);
     assert_eq!(masked["mse_bbox"], 1.0);
     assert_eq!(masked["mse_image_times_mask"], 0.5);
-    let ids: usize = skinsplat::metrics::VARIANT_IDS.iter().map(|(_, ids)| ids.len()).sum();
+    let ids: usize = skinsplat_metrics::VARIANT_IDS.iter().map(|(_, ids)| ids.len()).sum();
     assert_eq!(masked.as_object().unwrap().len(), ids);
 }

@@ -4,8 +4,8 @@ use crate::args;
 use crate::program::Desk;
 use crate::support::{fixture, png};
 use serde_json::Value;
-use skinsplat::data::{frames, npy};
-use skinsplat::scene::{Image, Mask};
+use skinsplat_core::scene::{Image, Mask};
+use skinsplat_data::{frames, npy};
 
 const WIDTH: usize = 40;
 const HEIGHT: usize = 36;

@@ -2,10 +2,11 @@
 
 use super::made_up::{TABLE_7, figures, fitted_table_7, options, own_data, run, table_7};
 use super::support;
-use skinsplat::experiment::{AvatarRecipe, Capture, Experiment, Layout, Paper, Role, Source, Variant, plan};
-use skinsplat::metrics::MetricKind;
+use skinsplat::experiment::{AvatarRecipe, Experiment, Layout, Paper, Role, Source, Variant, plan};
 use skinsplat::report;
-use skinsplat::strategy::PRESETS;
+use skinsplat_data::Capture;
+use skinsplat_metrics::MetricKind;
+use skinsplat_posing::PRESETS;
 use std::path::Path;
 
 fn transcription() -> toml::Table {

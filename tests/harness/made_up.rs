@@ -1,11 +1,12 @@
 //! Made-up data sets, experiments and scores.
 
 use skinsplat::experiment::{
-    AvatarFile, Capture, Dataset, Experiment, FrameInfo, FrameRecord, Options, Outcome, Plan, Profile,
-    Records, Role, Seconds, SequenceInfo, SubjectInfo, Subset, plan,
+    AvatarFile, Dataset, Experiment, FrameInfo, FrameRecord, Options, Outcome, Plan, Profile, Records, Role,
+    Seconds, SequenceInfo, SubjectInfo, Subset, plan,
 };
-use skinsplat::metrics::{FrameScore, Protocol};
 use skinsplat::report::{self, Results, Table};
+use skinsplat_data::Capture;
+use skinsplat_metrics::{FrameScore, Protocol};
 
 /// A seventh table: not one of the paper's, on a data set that no code knows.
 pub(super) const TABLE_7: &str = include_str!("table7.toml");

@@ -2,9 +2,10 @@
 
 use super::made_up::{figures, options, own_data, sequence, subject, table_7};
 use skinsplat::experiment::{
-    AvatarRecipe, Capture, Dataset, Experiment, Options, Plan, Profile, Role, Shard, Source, Subset,
-    canonical_json, plan,
+    AvatarRecipe, Dataset, Experiment, Options, Plan, Profile, Role, Shard, Source, Subset, plan,
 };
+use skinsplat_data::Capture;
+use skinsplat_data::key::canonical_json;
 use std::collections::BTreeSet;
 
 fn planned(experiments: &[Experiment], datasets: &[Dataset]) -> Plan {

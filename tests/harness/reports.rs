@@ -4,9 +4,9 @@ use super::made_up::{
     figures, fitted_table_7, options, results, run, score, scored, table, table_7, with_holes,
 };
 use skinsplat::experiment::{Experiment, Outcome, Records, Source, plan};
-use skinsplat::metrics::MetricKind;
 use skinsplat::report::compare::{Tolerances, Verdict, compare};
 use skinsplat::report::{self, Content, Results, RowKind, Table};
+use skinsplat_metrics::MetricKind;
 
 #[test]
 fn a_sequence_without_any_score_leaves_no_mean() {

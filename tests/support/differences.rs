@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout, reason = "tests; the agreement is printed")]
 
 use glam::Mat3;
-use skinsplat::scene::{Posed, PosedGradient};
+use skinsplat_core::scene::{Posed, PosedGradient};
 
 /// The central difference of a loss along one number of `posed`.
 pub fn difference(

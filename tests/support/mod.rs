@@ -1,13 +1,15 @@
 //! Paths shared by the integration tests.
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses a part of this module")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub mod png;
 
 /// A file under `tests/data`.
 pub fn data(path: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(path)
+    // The tests of every crate of the workspace share the data at its root.
+    let mut roots = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|root| root.join("tests/data"));
+    roots.find(|data| data.is_dir()).expect("tests run inside the repository").join(path)
 }
 
 /// A reference-value file under `tests/data/fixtures` (same layout as the set it was taken from).

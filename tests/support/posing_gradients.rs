@@ -2,8 +2,8 @@
 
 use super::rig;
 use glam::Mat3;
-use skinsplat::scene::{Avatar, AvatarGradient, Binding, FaceBinding, Posed, PosedBody, PosedGradient};
-use skinsplat::strategy::{
+use skinsplat_core::scene::{Avatar, AvatarGradient, Binding, FaceBinding, Posed, PosedBody, PosedGradient};
+use skinsplat_posing::{
     BoundAvatar, CovarianceChoice, LbsProjection, RotationChoice, Strategy, pose, pose_backward,
 };
 

@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub, reason = "shared by tests")]
 
 use glam::{DMat3, DMat4, DVec3, Mat3, Quat, Vec3};
-use skinsplat::scene::{Camera, ColourClamp, Posed};
+use skinsplat_core::scene::{Camera, ColourClamp, Posed};
 
 /// SplitMix64.
 pub struct Random(pub u64);

@@ -2,10 +2,10 @@
 #![allow(dead_code, reason = "each test binary uses a part of this module")]
 
 use glam::{DQuat, DVec3, Vec3};
-use skinsplat::math::average::Solver;
-use skinsplat::math::rotation::SignPolicy;
-use skinsplat::scene::{Avatar, Binding, FaceBinding, Gaussians, Pose, RestBody, Skeleton, SkinWeights};
-use skinsplat::strategy::{ColourChoice, CovarianceChoice, PRESETS, RotationChoice, Strategy};
+use skinsplat_core::math::average::Solver;
+use skinsplat_core::math::rotation::SignPolicy;
+use skinsplat_core::scene::{Avatar, Binding, FaceBinding, Gaussians, Pose, RestBody, Skeleton, SkinWeights};
+use skinsplat_posing::{ColourChoice, CovarianceChoice, PRESETS, RotationChoice, Strategy};
 
 pub(crate) const JOINTS: usize = 5;
 const RINGS: usize = 21;
@@ -108,7 +108,7 @@ pub(crate) fn on_faces(body: &RestBody, n: usize, seed: u64) -> Avatar {
     let mut noise = Noise(seed);
     let mut binding = FaceBinding::default();
     let mut means = Vec::new();
-    let normals = skinsplat::scene::body::vertex_normals(&body.vertices, &body.faces);
+    let normals = skinsplat_core::scene::body::vertex_normals(&body.vertices, &body.faces);
     for _ in 0..n {
         let face = ((noise.next() + 1.0) * 0.5 * body.faces.len() as f64) as usize;
         let (a, b) = (0.25 + 0.25 * noise.next(), 0.25 + 0.25 * noise.next());
@@ -161,7 +161,7 @@ fn variants(rotation: RotationChoice) -> [Strategy; 3] {
 /// Gram-Schmidt over rows, nor the sum of quaternions whose signs are fixed one by one, nor squaring that has not
 /// converged (it reads a column).
 pub(crate) fn equivariant(rotation: RotationChoice) -> bool {
-    use skinsplat::strategy::LbsProjection;
+    use skinsplat_posing::LbsProjection;
     match rotation {
         RotationChoice::Lbs(projection) => match projection {
             LbsProjection::GramSchmidtColumns | LbsProjection::Polar => true,

@@ -2,7 +2,7 @@
 #![allow(unreachable_pub, clippy::unwrap_used, reason = "shared by tests and benchmarks")]
 
 use glam::{DMat4, Vec3};
-use skinsplat::scene::{Camera, Gaussians};
+use skinsplat_core::scene::{Camera, Gaussians};
 use std::path::Path;
 
 /// Floats per Gaussian: position, normal, 3 + 45 SH, opacity, scale, rotation.

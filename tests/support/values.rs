@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses a part of this module")]
 
 use serde_json::Value;
-use skinsplat::math::{Matrix3, Quaternion, Real};
+use skinsplat_core::math::{Matrix3, Quaternion, Real};
 
 /// The numbers of nested arrays, flattened.
 pub fn numbers(value: &Value) -> Vec<f64> {

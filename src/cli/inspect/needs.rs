@@ -2,11 +2,11 @@
 
 use super::super::output::{Format, emit, emit_json};
 use super::line;
-use crate::data::{body, ply, poses};
-use crate::scene::{Binding, Body, Pose, RestBody};
-use crate::strategy::needs::{Degrees, Extreme, Needs};
-use crate::strategy::{Auto, BoundAvatar, RotationChoice};
 use anyhow::{Context as _, Result, bail};
+use skinsplat_core::scene::{Binding, Body, Pose, RestBody};
+use skinsplat_data::{body, ply, poses};
+use skinsplat_posing::needs::{Degrees, Extreme, Needs};
+use skinsplat_posing::{Auto, BoundAvatar, RotationChoice};
 use std::path::{Path, PathBuf};
 
 /// Pairs that are listed; JSON has them all.

@@ -2,11 +2,11 @@
 
 use super::pairs::{self, Pair};
 use super::{Context, Format, Score, emit, emit_json};
-use crate::data::lpips_weights::Networks;
-use crate::metrics::lpips::OneFrame;
-use crate::metrics::{FrameScore, MetricsError, PROTOCOLS, Protocol, Region, Summary, Truth, Wanted};
 use anyhow::{Context as _, Result};
 use serde_json::json;
+use skinsplat_metrics::lpips::OneFrame;
+use skinsplat_metrics::lpips::weights::Networks;
+use skinsplat_metrics::{FrameScore, MetricsError, PROTOCOLS, Protocol, Region, Summary, Truth, Wanted};
 use std::fmt::Write;
 
 /// What stands for all protocols.

@@ -7,16 +7,16 @@ use super::lpips::LpipsWeights;
 use super::output::{Format, emit, emit_json};
 use super::selection::parse_colour;
 use super::{Context, Exit};
-use crate::data::lpips_weights::Networks;
-use crate::metrics::lpips::OneFrame;
-use crate::metrics::{
-    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Summary, Truth, Wanted, all_variants,
-};
-use crate::scene::Image;
 use anyhow::{Context as _, Result};
 use pairs::Pair;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
+use skinsplat_core::scene::Image;
+use skinsplat_metrics::lpips::OneFrame;
+use skinsplat_metrics::lpips::weights::Networks;
+use skinsplat_metrics::{
+    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Summary, Truth, Wanted, all_variants,
+};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -140,7 +140,7 @@ fn lpips_variants(
     render: &Image,
     truth: &Image,
     distances: &OneFrame<'_>,
-) -> Result<Vec<crate::metrics::variants::VariantScore>> {
+) -> Result<Vec<skinsplat_metrics::variants::VariantScore>> {
     let (render, truth) = (Planes::new(render, "render")?, Planes::new(truth, "truth")?);
     let value = |variant: LpipsVariant| (variant.metric(), distances.distance(&render, &truth, variant));
     Ok(LpipsVariant::ALL.map(value).into())

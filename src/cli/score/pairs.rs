@@ -2,11 +2,11 @@
 
 use crate::cli::Context;
 use crate::cli::progress::Watch;
-use crate::data::frames::{load_image, load_mask};
 use crate::run::Event;
-use crate::scene::{Image, Mask};
 use anyhow::{Context as _, Result, bail};
 use rayon::prelude::*;
+use skinsplat_core::scene::{Image, Mask};
+use skinsplat_data::frames::{load_image, load_mask};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -1,0 +1,133 @@
+//! What can go wrong between a file and a scene type.
+
+use skinsplat_core::scene::SceneError;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// An error of the data layer. Every variant names the file, the field in it and what was expected, in one line.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refused to read.
+    #[error("{}: {field}: cannot read: {cause}; expected {expected}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The part of the input that the file is ("body", "image").
+        field: String,
+        /// What was expected.
+        expected: String,
+        /// Why the system refused.
+        cause: io::Error,
+    },
+    /// The operating system refused to write; nothing was left behind.
+    #[error("{}: {field}: cannot write: {cause}; expected {expected}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What was being written.
+        field: String,
+        /// What was expected.
+        expected: String,
+        /// Why the system refused.
+        cause: io::Error,
+    },
+    /// The file holds something else than it should.
+    #[error("{}: {field}: {problem}; expected {expected}", path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// The field, in the file's own terms, with an index where there is one.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+        /// What was expected.
+        expected: String,
+    },
+}
+
+impl Error {
+    /// A value that is not what it should be.
+    pub fn invalid(
+        path: impl Into<PathBuf>,
+        field: impl Into<String>,
+        problem: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Invalid {
+            path: path.into(),
+            field: field.into(),
+            problem: problem.into(),
+            expected: expected.into(),
+        }
+    }
+
+    /// A broken invariant of a scene type, found while reading `path`.
+    pub fn scene(path: impl Into<PathBuf>, error: SceneError) -> Self {
+        Self::invalid(path, error.field, error.problem, error.expected)
+    }
+
+    /// A file that could not be read.
+    pub fn read(
+        path: impl Into<PathBuf>,
+        field: impl Into<String>,
+        expected: impl Into<String>,
+        cause: io::Error,
+    ) -> Self {
+        Self::Read { path: path.into(), field: field.into(), expected: expected.into(), cause }
+    }
+
+    /// A file that could not be written.
+    pub fn write(path: impl Into<PathBuf>, field: impl Into<String>, cause: io::Error) -> Self {
+        let expected = "a writable path with space left".to_owned();
+        Self::Write { path: path.into(), field: field.into(), expected, cause }
+    }
+
+    /// The file that the error is about.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Read { path, .. } | Self::Write { path, .. } | Self::Invalid { path, .. } => path,
+        }
+    }
+
+    /// The field that the error is about.
+    pub fn field(&self) -> &str {
+        match self {
+            Self::Read { field, .. } | Self::Write { field, .. } | Self::Invalid { field, .. } => field,
+        }
+    }
+}
+
+/// What a pipe or device may deliver: such a source has no length of its own, and some never end.
+const MAX_STREAM: u64 = 1 << 32;
+
+/// Reads a whole file, or a pipe to its end.
+pub fn read_bytes(path: &Path, field: &str, expected: &str) -> Result<Vec<u8>, Error> {
+    let read = || {
+        let file = std::fs::File::open(path)?;
+        let length = file.metadata()?.len();
+        let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
+        if file.metadata()?.is_file() {
+            (&file).read_to_end(&mut bytes)?;
+        } else if (&file).take(MAX_STREAM).read_to_end(&mut bytes)? as u64 == MAX_STREAM {
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, "no end within 4 GiB"));
+        }
+        Ok(bytes)
+    };
+    read().map_err(|cause| Error::read(path, field, expected, cause))
+}
+
+/// Reads a whole UTF-8 file.
+pub fn read_text(path: &Path, field: &str, expected: &str) -> Result<String, Error> {
+    let bytes = read_bytes(path, field, expected)?;
+    String::from_utf8(bytes).map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))
+}
+
+/// Reads a JSON file into a type; the error names the place in the text.
+pub fn read_json<T: serde::de::DeserializeOwned>(
+    path: &Path,
+    field: &str,
+    expected: &str,
+) -> Result<T, Error> {
+    let text = read_text(path, field, expected)?;
+    serde_json::from_str(&text).map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))
+}

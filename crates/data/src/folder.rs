@@ -1,0 +1,281 @@
+//! A subject as a folder of sequences.
+//!
+//! ```text
+//! <subject>/<sequence>/transforms.json     model, cameras, frames (file, mask, camera, row of poses)
+//!                      cameras.npz         the same cameras (used if there)
+//!                      poses.npz           betas and poses (used if there; transforms.json may hold them instead)
+//!                      images/*.png, masks/*.png, or camNN/images/*.png, camNN/masks/*.png
+//! <subject>/gt_normal_offset.npy           clothing, (V) metres along the rest normals; see [`Options`]
+//! models/<model>                           in the subject's folder or one of the two above it
+//! ```
+//! Sequences named `train*` are for fitting, those named `test*` for evaluation.
+
+use super::poses::{self, PoseTrack};
+use super::{Capture, Error, Sequence, body, camera, error, npy};
+use super::{FrameRef, FrameSource};
+use serde::Deserialize;
+use skinsplat_core::scene::{Body, Camera, RestBody};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// How a subject is loaded.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// A body model to use instead of the one that the sequences name.
+    pub model: Option<PathBuf>,
+    /// Displace the body by `gt_normal_offset.npy`. Off by default: an evaluation does not know the clothing.
+    pub clothing: bool,
+}
+
+/// A person with training and test sequences.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The folder's name.
+    pub id: String,
+    /// How it was captured.
+    pub capture: Capture,
+    /// Sequences to fit on, by name.
+    pub train: Vec<Sequence>,
+    /// Sequences to evaluate on, by name.
+    pub test: Vec<Sequence>,
+}
+
+impl Subject {
+    /// Loads every sequence of a subject; no image is decoded.
+    ///
+    /// # Errors
+    /// A folder without sequences, missing files, inconsistent cameras, poses, frames or body.
+    pub fn load(folder: &Path, options: &Options) -> Result<Self, Error> {
+        let mut models = Models::new(folder, options);
+        let mut split = |prefix: &str| -> Result<Vec<Sequence>, Error> {
+            let names = sequence_folders(folder, prefix)?;
+            names.iter().map(|name| load_sequence(&folder.join(name), name, &mut models)).collect()
+        };
+        let (train, test) = (split("train")?, split("test")?);
+        let sequences = || train.iter().chain(&test);
+        let cameras = sequences().map(|s| s.cameras.len()).max();
+        let joints = sequences().map(|s| s.body.skeleton.num_joints()).max();
+        let capture = capture_of(folder, cameras.zip(joints))?;
+        let id = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        Ok(Self { id, capture, train, test })
+    }
+
+    /// All sequences, training first.
+    pub fn sequences(&self) -> impl Iterator<Item = &Sequence> {
+        self.train.iter().chain(&self.test)
+    }
+
+    /// A sequence by name.
+    pub fn sequence(&self, id: &str) -> Option<&Sequence> {
+        self.sequences().find(|s| s.id == id)
+    }
+}
+
+/// True if a folder looks like a subject: it holds a sequence folder with `transforms.json`.
+pub fn is_subject(folder: &Path) -> bool {
+    ["train", "test"]
+        .iter()
+        .any(|prefix| sequence_folders(folder, prefix).is_ok_and(|names| !names.is_empty()))
+}
+
+/// How a subject was captured, found without loading its body.
+///
+/// # Errors
+/// A folder without sequences, unreadable cameras or poses.
+pub fn inspect(folder: &Path) -> Result<Capture, Error> {
+    let mut most = None;
+    for name in
+        ["train", "test"].iter().map(|p| sequence_folders(folder, p)).collect::<Result<Vec<_>, _>>()?.concat()
+    {
+        let files = Files::of(&folder.join(name));
+        let (cameras, joints) = most.unwrap_or((0, 0));
+        let (more_cameras, more_joints) = (files.cameras()?.len(), files.poses()?.num_joints());
+        most = Some((cameras.max(more_cameras), joints.max(more_joints)));
+    }
+    capture_of(folder, most)
+}
+
+/// From the largest numbers of cameras and joints of a subject's sequences.
+fn capture_of(folder: &Path, cameras_and_joints: Option<(usize, usize)>) -> Result<Capture, Error> {
+    match cameras_and_joints {
+        None => {
+            let expected = "folders train* and test* with transforms.json";
+            Err(Error::invalid(folder, "sequences", "none", expected))
+        }
+        Some((2.., _)) => Ok(Capture::Multiview),
+        Some((_, 55..)) => Ok(Capture::Hands),
+        Some(_) => Ok(Capture::Monocular),
+    }
+}
+
+fn sequence_folders(folder: &Path, prefix: &str) -> Result<Vec<String>, Error> {
+    let entries = std::fs::read_dir(folder)
+        .map_err(|cause| Error::read(folder, "dataset", "a folder of sequences", cause))?;
+    let mut names: Vec<String> = entries
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.starts_with(prefix) && folder.join(name).join("transforms.json").is_file())
+        .collect();
+    names.sort();
+    Ok(names)
+}
+
+/// The part of `transforms.json` that only it holds.
+#[derive(Deserialize)]
+struct Transforms {
+    model: Option<String>,
+    frames: Vec<ListedFrame>,
+}
+
+#[derive(Deserialize)]
+struct ListedFrame {
+    file_path: String,
+    mask_path: Option<String>,
+    camera: usize,
+    time: usize,
+}
+
+/// Where a sequence keeps its parts.
+struct Files {
+    folder: PathBuf,
+    listing: PathBuf,
+}
+
+impl Files {
+    fn of(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), listing: folder.join("transforms.json") }
+    }
+
+    fn cameras(&self) -> Result<Vec<Camera>, Error> {
+        camera::load(&self.or_listing("cameras.npz"))
+    }
+
+    fn poses(&self) -> Result<PoseTrack, Error> {
+        poses::load(&self.or_listing("poses.npz"))
+    }
+
+    fn or_listing(&self, name: &str) -> PathBuf {
+        let own = self.folder.join(name);
+        if own.is_file() { own } else { self.listing.clone() }
+    }
+}
+
+fn load_sequence(folder: &Path, id: &str, models: &mut Models) -> Result<Sequence, Error> {
+    let files = Files::of(folder);
+    let transforms: Transforms =
+        error::read_json(&files.listing, "frames", "model, cameras and frames of a sequence")?;
+    let cameras = files.cameras()?;
+    let track = files.poses()?;
+    let body = models.named(&files.listing, transforms.model.as_deref(), &track.betas)?;
+    let poses = track.poses(&body.skeleton)?;
+    let frames = frames_of(&files, transforms.frames, poses.len(), cameras.len())?;
+    Ok(Sequence { id: id.to_owned(), body, poses, cameras, frames, stored_sizes: None })
+}
+
+/// Body models that were loaded for a subject, and the shapes of them that its sequences share.
+pub(super) struct Models<'a> {
+    subject: &'a Path,
+    options: &'a Options,
+    loaded: BTreeMap<PathBuf, Model>,
+}
+
+struct Model {
+    body: Body,
+    shapes: Vec<(Vec<f64>, Arc<RestBody>)>,
+}
+
+impl<'a> Models<'a> {
+    pub(super) fn new(subject: &'a Path, options: &'a Options) -> Self {
+        Self { subject, options, loaded: BTreeMap::new() }
+    }
+
+    /// The body of a shape; `source` is the file that names the model.
+    pub(super) fn named(
+        &mut self,
+        source: &Path,
+        name: Option<&str>,
+        betas: &[f64],
+    ) -> Result<Arc<RestBody>, Error> {
+        let path = self.find(source, name)?;
+        if !self.loaded.contains_key(&path) {
+            self.loaded.insert(path.clone(), Model { body: body::load(&path)?, shapes: Vec::new() });
+        }
+        let Model { body, shapes } = self.loaded.get_mut(&path).expect("inserted above");
+        if let Some((_, rest)) = shapes.iter().find(|(known, _)| known == betas) {
+            return Ok(rest.clone());
+        }
+        let mut rest = body.shaped(betas).map_err(|e| Error::scene(source, e))?;
+        let offsets = self.subject.join("gt_normal_offset.npy");
+        if self.options.clothing && offsets.is_file() {
+            let array = npy::read(&offsets)?;
+            let values: Vec<f32> = array.values.iter().map(|&v| v as f32).collect();
+            rest = rest.with_normal_offset(&values).map_err(|e| Error::scene(&offsets, e))?;
+        }
+        let rest = Arc::new(rest);
+        shapes.push((betas.to_vec(), rest.clone()));
+        Ok(rest)
+    }
+
+    /// A given model, or the named one in `models` of the subject's folder or of one of the two above it.
+    fn find(&self, source: &Path, name: Option<&str>) -> Result<PathBuf, Error> {
+        if let Some(model) = &self.options.model {
+            return Ok(model.clone());
+        }
+        let Some(name) = name else {
+            return Err(Error::invalid(source, "model", "missing", "a body model, named here or given"));
+        };
+        let places = ["models", "../models", "../../models"].map(|place| self.subject.join(place).join(name));
+        places.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
+            let expected = "a file in models/ of the subject's folder or of one of the two above it";
+            Error::invalid(source, "model", format!("{name} not found"), expected)
+        })
+    }
+}
+
+fn frames_of(
+    Files { folder, listing }: &Files,
+    listed: Vec<ListedFrame>,
+    poses: usize,
+    cameras: usize,
+) -> Result<Vec<FrameRef>, Error> {
+    let below = |i: usize, field: &str, value: usize, limit: usize, what: &str| {
+        if value < limit {
+            return Ok(());
+        }
+        let expected = format!("an index below {limit} ({what})");
+        Err(Error::invalid(listing, format!("frames[{i}].{field}"), value.to_string(), expected))
+    };
+    let present = |i: usize, field: &str, path: &str| {
+        let file = folder.join(path);
+        if file.is_file() {
+            return Ok(file);
+        }
+        Err(Error::invalid(
+            listing,
+            format!("frames[{i}].{field}"),
+            format!("no file {path}"),
+            "a file of the sequence",
+        ))
+    };
+    let frame = |(i, listed): (usize, ListedFrame)| {
+        below(i, "time", listed.time, poses, "poses")?;
+        below(i, "camera", listed.camera, cameras, "cameras")?;
+        let image = present(i, "file_path", &listed.file_path)?;
+        let mask = listed.mask_path.map(|path| present(i, "mask_path", &path)).transpose()?;
+        let name = frame_name(&listed.file_path);
+        Ok(FrameRef {
+            name,
+            pose: listed.time,
+            camera: listed.camera,
+            source: FrameSource::Files { image, mask },
+        })
+    };
+    listed.into_iter().enumerate().map(frame).collect()
+}
+
+/// `cam00/images/image_0004.png` -> `cam00/image_0004`.
+fn frame_name(path: &str) -> String {
+    let parts: Vec<&str> = path.split('/').filter(|part| *part != "images").collect();
+    let name = parts.join("/");
+    name.rsplit_once('.').map_or(name.clone(), |(stem, _)| stem.to_owned())
+}

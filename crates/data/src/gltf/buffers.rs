@@ -1,0 +1,226 @@
+//! A glTF document with its buffers, and accessors that are checked before they are read.
+
+use super::super::{Error, error};
+use ::gltf::accessor::{DataType, Dimensions, Item, Iter};
+use ::gltf::json::validation::Checked;
+use ::gltf::{Accessor, Document, Gltf, buffer, image};
+use base64::Engine;
+use glam::Mat4;
+use skinsplat_core::scene::SceneError;
+use std::path::{Path, PathBuf};
+
+/// A parsed document and the bytes that it refers to.
+pub(in super::super) struct Source {
+    pub(super) document: Document,
+    buffers: Vec<Vec<u8>>,
+    folder: PathBuf,
+}
+
+impl Source {
+    pub(super) fn open(path: &Path) -> Result<Self, Error> {
+        let expected = "a glTF 2.0 document";
+        let bytes = error::read_bytes(path, "glTF", expected)?;
+        let invalid = |cause: ::gltf::Error| Error::invalid(path, "glTF", one_line(&cause), expected);
+        let Gltf { document, blob } = Gltf::from_slice_without_validation(&bytes).map_err(invalid)?;
+        let root = document.into_json();
+        check_root(&root).map_err(|e| Error::scene(path, e))?;
+        let document = Document::from_json(root).map_err(invalid)?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let mut source = Self { document, buffers: Vec::new(), folder };
+        source.buffers = source.load_buffers(blob).map_err(|e| Error::scene(path, e))?;
+        Ok(source)
+    }
+
+    fn load_buffers(&self, mut blob: Option<Vec<u8>>) -> Result<Vec<Vec<u8>>, SceneError> {
+        let load = |buffer: buffer::Buffer| {
+            let field = format!("buffers[{}]", buffer.index());
+            let bytes = match buffer.source() {
+                buffer::Source::Bin => blob
+                    .take()
+                    .ok_or_else(|| SceneError::new(&field, "no binary chunk", "a .glb with its BIN chunk"))?,
+                buffer::Source::Uri(uri) => self.resolve(uri, &field)?,
+            };
+            if bytes.len() < buffer.length() {
+                let problem = format!("truncated, {} bytes", bytes.len());
+                return Err(SceneError::new(field, problem, format!("byteLength {}", buffer.length())));
+            }
+            Ok(bytes)
+        };
+        self.document.buffers().map(load).collect()
+    }
+
+    /// The bytes behind a `data:` URI or a relative path.
+    fn resolve(&self, uri: &str, field: &str) -> Result<Vec<u8>, SceneError> {
+        let broken = |problem: String| {
+            SceneError::new(format!("{field}.uri"), problem, "a relative path or a base64 data URI")
+        };
+        if let Some(data) = uri.strip_prefix("data:") {
+            let (_, text) =
+                data.split_once(";base64,").ok_or_else(|| broken("data that is not base64".into()))?;
+            return base64::engine::general_purpose::STANDARD.decode(text).map_err(|e| broken(e.to_string()));
+        }
+        if uri.contains(':') {
+            return Err(broken(format!("{uri:?}")));
+        }
+        let relative = urlencoding::decode(uri).map_err(|e| broken(e.to_string()))?;
+        let path = self.folder.join(relative.as_ref());
+        std::fs::read(&path).map_err(|e| broken(format!("{}: {e}", path.display())))
+    }
+
+    /// The encoded bytes of an image.
+    pub(super) fn image_bytes(&self, image: &image::Image) -> Result<Vec<u8>, SceneError> {
+        // Not through `image.source()`, which panics on a view without a MIME type.
+        let field = format!("images[{}]", image.index());
+        let json = &self.document.as_json().images[image.index()];
+        match (&json.buffer_view, &json.uri) {
+            (Some(index), _) => match self.document.views().nth(index.value()) {
+                Some(view) => self.view(&view, &field).map(<[u8]>::to_vec),
+                None => Err(SceneError::new(field, "no such buffer view", "a buffer view or a URI")),
+            },
+            (None, Some(uri)) => self.resolve(uri, &field),
+            (None, None) => Err(SceneError::new(field, "no source", "a buffer view or a URI")),
+        }
+    }
+
+    /// The parent of each node.
+    pub(super) fn parents(&self) -> Result<Vec<Option<usize>>, SceneError> {
+        let mut parents = vec![None; self.document.nodes().count()];
+        for node in self.document.nodes() {
+            for child in node.children() {
+                if let Some(other) = parents[child.index()].replace(node.index()) {
+                    let problem = format!("parents {other} and {}", node.index());
+                    return Err(SceneError::new(
+                        format!("nodes[{}]", child.index()),
+                        problem,
+                        "at most one parent",
+                    ));
+                }
+            }
+        }
+        // A cycle among ancestors would never end the walk to the root.
+        for start in 0..parents.len() {
+            let mut node = start;
+            for _ in 0..=parents.len() {
+                let Some(parent) = parents[node] else { break };
+                node = parent;
+            }
+            if parents[node].is_some() {
+                return Err(SceneError::new(format!("nodes[{start}]"), "a cycle", "a forest of nodes"));
+            }
+        }
+        Ok(parents)
+    }
+
+    /// The items of an accessor, whose element type must be `T`'s.
+    pub(super) fn items<T: Item>(
+        &self,
+        accessor: &Accessor,
+        kind: (DataType, Dimensions),
+        field: &str,
+    ) -> Result<Vec<T>, SceneError> {
+        if (accessor.data_type(), accessor.dimensions()) != kind {
+            let problem = format!("{:?} of {:?}", accessor.dimensions(), accessor.data_type());
+            return Err(SceneError::new(field, problem, format!("{:?} of {:?}", kind.1, kind.0)));
+        }
+        self.check_extents(accessor, field)?;
+        let data = |buffer: buffer::Buffer| self.buffers.get(buffer.index()).map(Vec::as_slice);
+        Iter::new(accessor.clone(), data)
+            .map(Iterator::collect)
+            .ok_or_else(|| SceneError::new(field, "no data", "an accessor with a buffer view"))
+    }
+
+    /// A list of 4x4 matrices.
+    pub(super) fn matrices(&self, accessor: &Accessor, field: &str) -> Result<Vec<Mat4>, SceneError> {
+        let columns: Vec<[[f32; 4]; 4]> = self.items(accessor, (DataType::F32, Dimensions::Mat4), field)?;
+        Ok(columns.iter().map(Mat4::from_cols_array_2d).collect())
+    }
+
+    fn check_extents(&self, accessor: &Accessor, field: &str) -> Result<(), SceneError> {
+        let view = accessor.view();
+        let Some(view) = view else {
+            return Err(SceneError::new(field, "no buffer view", "an accessor with data"));
+        };
+        self.check_extent(&view, accessor.offset(), accessor.count(), accessor.size(), field)?;
+        if let Some(sparse) = accessor.sparse() {
+            let (indices, values) = (sparse.indices(), sparse.values());
+            let index_size = indices.index_type().size();
+            self.check_extent(&indices.view(), indices.offset(), sparse.count(), index_size, field)?;
+            self.check_extent(&values.view(), values.offset(), sparse.count(), accessor.size(), field)?;
+        }
+        Ok(())
+    }
+
+    /// `count` items of `size` bytes must lie within the view, and the view within its buffer.
+    fn check_extent(
+        &self,
+        view: &buffer::View,
+        offset: usize,
+        count: usize,
+        size: usize,
+        field: &str,
+    ) -> Result<(), SceneError> {
+        let bytes = self.view(view, field)?.len();
+        let stride = view.stride().unwrap_or(size);
+        let last = count.checked_sub(1).and_then(|n| n.checked_mul(stride));
+        let end = last.and_then(|last| last.checked_add(offset)?.checked_add(size));
+        if stride >= size && end.is_some_and(|end| end <= bytes) {
+            return Ok(());
+        }
+        let problem =
+            format!("{count} items, {stride} bytes apart from {offset}, in a view of {bytes} bytes");
+        Err(SceneError::new(field, problem, "at least one item, and all of them inside the view"))
+    }
+
+    fn view(&self, view: &buffer::View, field: &str) -> Result<&[u8], SceneError> {
+        let end = view.offset().checked_add(view.length());
+        let bytes = self.buffers.get(view.buffer().index());
+        bytes.zip(end).and_then(|(bytes, end)| bytes.get(view.offset()..end)).ok_or_else(|| {
+            let problem = format!("bufferViews[{}] ends outside its buffer", view.index());
+            SceneError::new(field, problem, "a view inside its buffer")
+        })
+    }
+}
+
+/// What the crate's own validation takes for granted.
+fn check_root(root: &::gltf::json::Root) -> Result<(), SceneError> {
+    if !root.asset.version.starts_with("2.") {
+        return Err(SceneError::new("asset.version", &root.asset.version, "2.x"));
+    }
+    for (m, mesh) in root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            if let Some(index) = primitive.attributes.values().find(|i| i.value() >= root.accessors.len()) {
+                let field = format!("meshes[{m}].primitives[{p}].attributes");
+                let expected = format!("an index below {} (accessors)", root.accessors.len());
+                return Err(SceneError::new(field, format!("accessor {}", index.value()), expected));
+            }
+        }
+    }
+    for (a, animation) in root.animations.iter().enumerate() {
+        for (c, channel) in animation.channels.iter().enumerate() {
+            let field = format!("animations[{a}].channels[{c}].target");
+            let node = channel.target.node.value();
+            if node >= root.nodes.len() {
+                let expected = format!("an index below {} (nodes)", root.nodes.len());
+                return Err(SceneError::new(field, format!("node {node}"), expected));
+            }
+            if channel.target.path == Checked::Invalid {
+                return Err(SceneError::new(
+                    field,
+                    "unknown path",
+                    "translation, rotation, scale or weights",
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A validation error lists every fault; the first one is enough.
+fn one_line(error: &::gltf::Error) -> String {
+    match error {
+        ::gltf::Error::Validation(faults) if !faults.is_empty() => {
+            format!("{}: {}", faults[0].0, faults[0].1)
+        }
+        other => other.to_string(),
+    }
+}

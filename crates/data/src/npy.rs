@@ -1,0 +1,231 @@
+//! NumPy `.npy` arrays of numbers, in either byte order and either memory order.
+//!
+//! The header is parsed here and not by the `npyz` crate, which this layer otherwise uses: that one allocates the
+//! header length that a file claims, overflows on the product of an absurd shape and recurses as deep as the header's
+//! brackets nest.
+
+use super::{Error, atomic};
+use skinsplat_core::scene::SceneError;
+use std::fs::File;
+use std::io::{BufReader, Read, Write};
+use std::path::Path;
+
+/// No array of more values than this is read (1 GiB as `f64`); the largest known body model has 15 million.
+pub const MAX_VALUES: usize = 1 << 27;
+
+const MAGIC: &[u8; 6] = b"\x93NUMPY";
+const MAX_HEADER: usize = 1 << 16;
+
+/// An array in C order (the last index runs fastest), whatever the order in the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    /// Extent of each axis; empty for a scalar.
+    pub shape: Vec<usize>,
+    /// All values.
+    pub values: Vec<f64>,
+}
+
+/// What a header says of an array.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// Element type as NumPy writes it, such as `<f4`.
+    pub descr: String,
+    /// Extent of each axis; empty for a scalar.
+    pub shape: Vec<usize>,
+    fortran_order: bool,
+}
+
+/// Reads an `.npy` file of real numbers, integers or booleans.
+///
+/// # Errors
+/// A file that is not `.npy`, is truncated, or holds another type.
+pub fn read(path: &Path) -> Result<Array, Error> {
+    let file = File::open(path).map_err(|cause| Error::read(path, "file", "a .npy array", cause))?;
+    read_array(BufReader::new(file), "array").map_err(|e| Error::scene(path, e))
+}
+
+/// Writes `f32` values as a little-endian `.npy` file of the given shape.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_f32(path: &Path, shape: &[usize], values: impl IntoIterator<Item = f32>) -> Result<(), Error> {
+    let extents: String = shape.iter().map(|n| format!("{n}, ")).collect();
+    let dict = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({extents}), }}");
+    // Magic (6), version (2), length (2), text and newline together fill a multiple of 64 bytes.
+    let padded = (10 + dict.len() + 1).next_multiple_of(64) - 10;
+    atomic::write(path, |w| {
+        w.write_all(MAGIC)?;
+        w.write_all(&[1, 0])?;
+        w.write_all(&(padded as u16).to_le_bytes())?;
+        w.write_all(format!("{dict:<width$}\n", width = padded - 1).as_bytes())?;
+        values.into_iter().try_for_each(|v| w.write_all(&v.to_le_bytes()))
+    })
+}
+
+/// Reads an array of numbers; errors name `field`.
+pub(super) fn read_array(mut reader: impl Read, field: &str) -> Result<Array, SceneError> {
+    let header = read_header(&mut reader, field)?;
+    let (big_endian, kind, size) = element(&header.descr, field)?;
+    let convert: fn(&[u8]) -> f64 = match (kind, size) {
+        ('f', 4) => |b| f64::from(f32::from_le_bytes(sized(b))),
+        ('f', 8) => |b| f64::from_le_bytes(sized(b)),
+        ('i', 1) => |b| f64::from(b[0] as i8),
+        ('i', 2) => |b| f64::from(i16::from_le_bytes(sized(b))),
+        ('i', 4) => |b| f64::from(i32::from_le_bytes(sized(b))),
+        ('i', 8) => |b| i64::from_le_bytes(sized(b)) as f64,
+        ('u' | 'b', 1) => |b| f64::from(b[0]),
+        ('u', 2) => |b| f64::from(u16::from_le_bytes(sized(b))),
+        ('u', 4) => |b| f64::from(u32::from_le_bytes(sized(b))),
+        ('u', 8) => |b| u64::from_le_bytes(sized(b)) as f64,
+        _ => return Err(type_error(&header.descr, field)),
+    };
+    let mut bytes = read_elements(reader, &header, size, field)?;
+    if big_endian {
+        bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
+    }
+    let mut values: Vec<f64> = bytes.chunks_exact(size).map(convert).collect();
+    if header.fortran_order {
+        values = to_c_order(&values, &header.shape);
+    }
+    Ok(Array { shape: header.shape, values })
+}
+
+/// Reads an array of `U` (UTF-32) or `S` (bytes) strings, flat.
+pub(super) fn read_text(mut reader: impl Read, field: &str) -> Result<Vec<String>, SceneError> {
+    let header = read_header(&mut reader, field)?;
+    let (big_endian, kind, width) = element(&header.descr, field)?;
+    let size = match kind {
+        'U' => width.checked_mul(4),
+        'S' => Some(width),
+        _ => None,
+    };
+    let Some(size) = size.filter(|&s| s > 0) else {
+        return Err(SceneError::new(field, format!("type {}", header.descr), "strings (U or S)"));
+    };
+    let bytes = read_elements(reader, &header, size, field)?;
+    let string = |element: &[u8]| -> String {
+        let unit =
+            |b: &[u8]| if big_endian { u32::from_be_bytes(sized(b)) } else { u32::from_le_bytes(sized(b)) };
+        let character = |code: u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
+        let text: String = match kind {
+            'U' => element.chunks_exact(4).map(|b| character(unit(b))).collect(),
+            _ => String::from_utf8_lossy(element).into_owned(),
+        };
+        text.trim_end_matches('\0').to_owned()
+    };
+    Ok(bytes.chunks_exact(size).map(string).collect())
+}
+
+/// Reads the header and leaves the reader at the first element.
+pub(super) fn read_header(reader: &mut impl Read, field: &str) -> Result<Header, SceneError> {
+    let broken = |problem: &str| SceneError::new(field, problem, "a NumPy .npy header");
+    let mut fixed = [0; 10];
+    reader.read_exact(&mut fixed).map_err(|e| broken(&e.to_string()))?;
+    if &fixed[..6] != MAGIC {
+        return Err(broken("no .npy magic at its start"));
+    }
+    let mut length = usize::from(u16::from_le_bytes([fixed[8], fixed[9]]));
+    if fixed[6] >= 2 {
+        let mut high = [0; 2];
+        reader.read_exact(&mut high).map_err(|e| broken(&e.to_string()))?;
+        length |= usize::from(u16::from_le_bytes(high)) << 16;
+    }
+    if !(1..=3).contains(&fixed[6]) || length > MAX_HEADER {
+        return Err(broken(&format!("version {} with a header of {length} bytes", fixed[6])));
+    }
+    let mut text = vec![0; length];
+    reader.read_exact(&mut text).map_err(|e| broken(&e.to_string()))?;
+    let text = String::from_utf8_lossy(&text);
+    parse_dict(&text).ok_or_else(|| broken(&format!("header {:?}", text.trim_end())))
+}
+
+/// The three keys of the header's Python dictionary. Structured types (a list after `descr`) are not read.
+fn parse_dict(text: &str) -> Option<Header> {
+    let after = |key: &str| -> Option<&str> {
+        let rest = &text[text.find(&format!("'{key}'"))? + key.len() + 2..];
+        Some(rest.trim_start().strip_prefix(':')?.trim_start())
+    };
+    let descr = after("descr")?.strip_prefix('\'')?.split_once('\'')?.0.to_owned();
+    let order = after("fortran_order")?;
+    let fortran_order = order.starts_with("True");
+    if !(fortran_order || order.starts_with("False")) {
+        return None;
+    }
+    let extents = after("shape")?.strip_prefix('(')?.split_once(')')?.0;
+    let shape = extents
+        .split(',')
+        .map(str::trim)
+        .filter(|extent| !extent.is_empty())
+        .map(|extent| extent.trim_end_matches('L').parse().ok())
+        .collect::<Option<Vec<usize>>>()?;
+    Some(Header { descr, shape, fortran_order })
+}
+
+/// Splits `<f4` into (big endian, kind, size).
+fn element(descr: &str, field: &str) -> Result<(bool, char, usize), SceneError> {
+    let mut characters = descr.chars();
+    let order = characters.next().filter(|c| "<>|=".contains(*c));
+    let (kind, size) = (characters.next(), characters.as_str().parse().ok());
+    match (order, kind, size) {
+        (Some(order), Some(kind), Some(size)) => Ok((order == '>', kind, size)),
+        _ => Err(type_error(descr, field)),
+    }
+}
+
+fn type_error(descr: &str, field: &str) -> SceneError {
+    let hint = if descr.contains('O') { " (a pickled Python object)" } else { "" };
+    let expected = "32 or 64 bit floats, integers or booleans";
+    SceneError::new(field, format!("type {descr}{hint}"), expected)
+}
+
+/// Reads exactly the elements that the shape announces; memory grows with what arrives, not with what is announced.
+fn read_elements(
+    reader: impl Read,
+    header: &Header,
+    size: usize,
+    field: &str,
+) -> Result<Vec<u8>, SceneError> {
+    let count = header.shape.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
+    let total =
+        count.filter(|&n| n <= MAX_VALUES).and_then(|n| n.checked_mul(size)).filter(|&n| n <= MAX_VALUES * 8);
+    let Some(total) = total else {
+        let expected = format!("at most {MAX_VALUES} values");
+        return Err(SceneError::new(field, format!("shape {:?}", header.shape), expected));
+    };
+    let mut bytes = Vec::new();
+    reader.take(total as u64).read_to_end(&mut bytes).map_err(|cause| {
+        SceneError::new(field, format!("cannot read: {cause}"), format!("{total} bytes of array data"))
+    })?;
+    if bytes.len() < total {
+        let expected = format!("{total} for shape {:?}", header.shape);
+        return Err(SceneError::new(field, format!("truncated, {} bytes", bytes.len()), expected));
+    }
+    Ok(bytes)
+}
+
+fn sized<const N: usize>(bytes: &[u8]) -> [u8; N] {
+    std::array::from_fn(|i| bytes[i])
+}
+
+fn to_c_order(values: &[f64], shape: &[usize]) -> Vec<f64> {
+    let mut strides = vec![1; shape.len()];
+    for axis in 1..shape.len() {
+        strides[axis] = strides[axis - 1] * shape[axis - 1];
+    }
+    let mut index = vec![0; shape.len()];
+    let mut offset = 0;
+    let mut ordered = Vec::with_capacity(values.len());
+    for _ in 0..values.len() {
+        ordered.push(values[offset]);
+        for axis in (0..shape.len()).rev() {
+            index[axis] += 1;
+            offset += strides[axis];
+            if index[axis] < shape[axis] {
+                break;
+            }
+            offset -= strides[axis] * shape[axis];
+            index[axis] = 0;
+        }
+    }
+    ordered
+}

@@ -1,0 +1,175 @@
+//! NumPy `.npz` archives: named arrays, read one at a time and checked against the shape that is expected of them.
+
+use super::Error;
+use super::npy::{self, Array, Header};
+use npyz::npz::NpzArchive;
+use skinsplat_core::scene::SceneError;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+/// An open archive.
+pub struct Archive {
+    path: PathBuf,
+    inner: NpzArchive<BufReader<File>>,
+    extents: BTreeMap<char, usize>,
+}
+
+impl std::fmt::Debug for Archive {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Archive")
+            .field("path", &self.path)
+            .field("extents", &self.extents)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Archive {
+    /// Opens an archive and reads its directory. `what` says what the file is for ("body", "poses").
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no zip archive.
+    pub fn open(path: &Path, what: &str) -> Result<Self, Error> {
+        let inner = NpzArchive::open(path)
+            .map_err(|cause| Error::read(path, what, "a .npz archive of arrays", cause))?;
+        Ok(Self { path: path.to_owned(), inner, extents: BTreeMap::new() })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Names of all arrays, sorted.
+    pub fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.inner.array_names().map(str::to_owned).collect();
+        names.sort();
+        names
+    }
+
+    /// True if the archive holds the array.
+    pub fn contains(&self, name: &str) -> bool {
+        self.inner.array_names().any(|n| n == name)
+    }
+
+    /// Type and shape of an array, without its values.
+    ///
+    /// # Errors
+    /// If it is missing or its header is broken.
+    pub fn header(&mut self, name: &str) -> Result<Header, Error> {
+        self.entry(name, |mut reader| npy::read_header(&mut reader, name))?
+            .ok_or_else(|| self.missing(name, "an array"))
+    }
+
+    /// An array of any shape; `None` if there is none of that name.
+    ///
+    /// # Errors
+    /// Broken or truncated data, or another type than numbers.
+    pub fn array(&mut self, name: &str) -> Result<Option<Array>, Error> {
+        self.entry(name, |reader| npy::read_array(reader, name))
+    }
+
+    /// An array of strings; `None` if there is none of that name.
+    ///
+    /// # Errors
+    /// Broken or truncated data, or another type than strings.
+    pub fn text(&mut self, name: &str) -> Result<Option<Vec<String>>, Error> {
+        self.entry(name, |reader| npy::read_text(reader, name))
+    }
+
+    /// An array of finite numbers whose shape fits `pattern`, such as `"V,3"`. A letter stands for any extent when it
+    /// is first met and for the same extent in every later array of this archive; `*` for any extent.
+    ///
+    /// # Errors
+    /// A missing array, another shape, NaN or infinite values.
+    pub fn require(&mut self, name: &str, pattern: &str) -> Result<Array, Error> {
+        self.optional(name, pattern)?.ok_or_else(|| self.missing(name, &format!("an array ({pattern})")))
+    }
+
+    /// As [`Archive::require`]; `None` if there is no array of that name.
+    ///
+    /// # Errors
+    /// Another shape, NaN or infinite values.
+    pub fn optional(&mut self, name: &str, pattern: &str) -> Result<Option<Array>, Error> {
+        let Some(array) = self.array(name)? else { return Ok(None) };
+        self.check_shape(name, &array.shape, pattern)?;
+        if let Some(i) = array.values.iter().position(|v| !v.is_finite()) {
+            let index = array.index_of(i);
+            return Err(self.invalid(format!("{name}{index:?}"), "NaN or infinite", "finite values"));
+        }
+        Ok(Some(array))
+    }
+
+    /// An error about a field of this archive.
+    pub fn invalid(
+        &self,
+        field: impl Into<String>,
+        problem: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Error {
+        Error::invalid(&self.path, field, problem, expected)
+    }
+
+    fn missing(&self, name: &str, expected: &str) -> Error {
+        self.invalid(name, format!("missing; the archive holds {}", self.names().join(", ")), expected)
+    }
+
+    fn check_shape(&mut self, name: &str, shape: &[usize], pattern: &str) -> Result<(), Error> {
+        let tokens: Vec<&str> = pattern.split(',').filter(|t| !t.is_empty()).collect();
+        let mut fits = tokens.len() == shape.len();
+        for (token, &extent) in tokens.iter().zip(shape) {
+            let expected = match (token.parse::<usize>(), token.chars().next()) {
+                (Ok(number), _) => number,
+                (_, Some('*')) => extent,
+                (_, Some(letter)) if fits => *self.extents.entry(letter).or_insert(extent),
+                _ => extent,
+            };
+            fits &= expected == extent;
+        }
+        if fits {
+            return Ok(());
+        }
+        let known: Vec<String> = tokens
+            .iter()
+            .filter_map(|t| t.chars().next())
+            .filter_map(|letter| Some(format!("{letter} = {}", self.extents.get(&letter)?)))
+            .collect();
+        let known = if known.is_empty() { String::new() } else { format!(" with {}", known.join(", ")) };
+        Err(self.invalid(name, format!("shape {shape:?}"), format!("({pattern}){known}")))
+    }
+
+    fn entry<T>(
+        &mut self,
+        name: &str,
+        read: impl FnOnce(&mut dyn Read) -> Result<T, SceneError>,
+    ) -> Result<Option<T>, Error> {
+        if !self.contains(name) {
+            return Ok(None);
+        }
+        let file_name = npyz::npz::file_name_from_array_name(name);
+        let mut entry = self.inner.zip_archive().by_name(&file_name).map_err(|cause| {
+            Error::invalid(&self.path, name, format!("cannot read: {cause}"), "a stored or deflated array")
+        })?;
+        read(&mut entry).map(Some).map_err(|e| Error::scene(&self.path, e))
+    }
+}
+
+impl Array {
+    /// The index of the value at flat position `i`.
+    fn index_of(&self, i: usize) -> Vec<usize> {
+        let mut rest = i;
+        let mut index: Vec<usize> = self
+            .shape
+            .iter()
+            .rev()
+            .map(|&n| {
+                let k = rest % n;
+                rest /= n;
+                k
+            })
+            .collect();
+        index.reverse();
+        index
+    }
+}

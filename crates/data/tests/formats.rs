@@ -1,0 +1,17 @@
+//! Readers and writers of the data layer: what the formats allow, and what is refused, by file and field.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+#[path = "formats/arrays.rs"]
+mod arrays;
+#[path = "formats/cameras_and_images.rs"]
+mod cameras_and_images;
+#[path = "../../../tests/support/files.rs"]
+mod files;
+#[path = "formats/gltf_files.rs"]
+mod gltf_files;
+#[path = "formats/smpl.rs"]
+mod smpl;
+#[path = "formats/splatting_avatar.rs"]
+mod splatting_avatar;
+#[path = "../../../tests/support/mod.rs"]
+mod support;

@@ -1,0 +1,198 @@
+//! SMPL-style bodies and poses.
+
+use crate::files::{self, Values};
+use glam::{DVec3, Vec3};
+use skinsplat_core::scene::PosedBody;
+use skinsplat_data::{body, poses};
+use std::path::{Path, PathBuf};
+
+fn write(folder: &Path, arrays: &[(&str, &[u64], Values)]) -> PathBuf {
+    let path = folder.join("file.npz");
+    files::npz(&path, arrays);
+    path
+}
+
+fn body_with(folder: &Path, name: &'static str, shape: &'static [u64], values: Values) -> PathBuf {
+    let mut arrays = files::small_body();
+    arrays.retain(|(n, ..)| *n != name);
+    arrays.push((name, shape, values));
+    write(folder, &arrays)
+}
+
+fn body_without(folder: &Path, name: &str) -> PathBuf {
+    let mut arrays = files::small_body();
+    arrays.retain(|(n, ..)| *n != name);
+    write(folder, &arrays)
+}
+
+#[test]
+fn a_body_is_read_shaped_and_posed() {
+    let folder = tempfile::tempdir().unwrap();
+    let body = body::load(&write(folder.path(), &files::small_body())).unwrap();
+    assert_eq!(body.rest.faces, [[0, 1, 3], [1, 2, 3]]);
+    assert_eq!(body.rest.skeleton.names, ["joint 0", "joint 1"]);
+    assert_eq!(body.rest.weights.row(2), (&[1u16][..], &[1.0f32][..]));
+    let rest = body.shaped(&[2.0, 0.0]).unwrap();
+    assert_eq!(rest.vertices[2], DVec3::new(4.0, 0.0, 0.0));
+    assert_eq!(
+        rest.skeleton.rest_locals[1].translation,
+        DVec3::new(2.0, 0.0, 0.0),
+        "joints follow the shape"
+    );
+    assert_eq!(body.shaped(&[0.0, 1.0]).unwrap_err().field, "betas[1]");
+
+    let quarter = std::f32::consts::FRAC_PI_2;
+    let path = folder.path().join("poses.npz");
+    let thetas = Values::F32(vec![0., 0., 0., 0., 0., quarter]);
+    let betas = Values::F32(vec![2.0]);
+    files::npz(
+        &path,
+        &[
+            ("thetas", &[1, 6], thetas),
+            ("transl", &[1, 3], Values::F32(vec![0., 0., 7.])),
+            ("betas", &[1], betas),
+        ],
+    );
+    let track = poses::load(&path).unwrap();
+    assert_eq!((track.len(), track.num_joints(), &track.betas[..]), (1, 2, &[2.0][..]));
+    let rest = body.shaped(&track.betas).unwrap();
+    let pose = &track.poses(&rest.skeleton).unwrap()[0];
+    let mesh = PosedBody::new(&rest, pose).unwrap().mesh().vertices[2];
+    assert!((mesh - Vec3::new(2.0, 2.0, 7.0)).length() < 1e-6, "{mesh}");
+}
+
+#[test]
+fn models_of_other_writers_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let expected = body::load(&write(folder, &files::small_body())).unwrap();
+    // The root's parent as SMPL's own files store it, faces under their other name.
+    let unsigned = Values::U32(vec![u32::MAX, 0, 0, 1]);
+    assert_eq!(body::load(&body_with(folder, "kintree_table", &[2, 2], unsigned)).unwrap(), expected);
+    let mut arrays = files::small_body();
+    arrays[1].0 = "faces";
+    assert_eq!(body::load(&write(folder, &arrays)).unwrap(), expected);
+    // Pose directions that are all zero count as none; others are kept, direction by direction.
+    let zeros = Values::F32(vec![0.0; 4 * 3 * 9]);
+    assert_eq!(body::load(&body_with(folder, "posedirs", &[4, 3, 9], zeros)).unwrap(), expected);
+    let directions = Values::F32((0..108).map(|v| v as f32).collect());
+    let body = body::load(&body_with(folder, "posedirs", &[4, 3, 9], directions)).unwrap();
+    assert_eq!(body.rest.pose_directions.len(), 9);
+    assert_eq!(body.rest.pose_directions[8][3], Vec3::new(89.0, 98.0, 107.0));
+    // Rest joints instead of a regressor: they do not follow the shape.
+    let mut arrays = files::small_body();
+    arrays[4] = ("J", &[2, 3], Values::F32(vec![0., 0., 0., 1., 0., 0.]));
+    let body = body::load(&write(folder, &arrays)).unwrap();
+    assert_eq!(body.rest.skeleton, expected.rest.skeleton);
+    assert_eq!(body.shaped(&[2.0]).unwrap().skeleton, expected.rest.skeleton);
+}
+
+#[test]
+fn what_is_wrong_with_a_body_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for name in ["v_template", "weights", "kintree_table", "J_regressor"] {
+        assert_eq!(body::load(&body_without(folder, name)).unwrap_err().field(), name);
+    }
+    assert_eq!(body::load(&body_without(folder, "f")).unwrap_err().field(), "faces");
+    let f32s = |v: &[f32]| Values::F32(v.to_vec());
+    let cases: [(&str, &[u64], Values, &str); 14] = [
+        ("v_template", &[4, 2], f32s(&[0.0; 8]), "v_template"),
+        ("v_template", &[5, 3], f32s(&[0.0; 15]), "weights"),
+        ("v_template", &[4, 3], f32s(&[f32::NAN; 12]), "v_template[0, 0]"),
+        ("f", &[1, 3], Values::I64(vec![0, 1, 4]), "f[0]"),
+        ("f", &[1, 3], Values::I64(vec![0, 1, -1]), "f[0, 2]"),
+        ("f", &[1, 3], Values::F64(vec![0.0, 1.5, 2.0]), "f[0, 1]"),
+        ("weights", &[4, 2], f32s(&[1., 0., 0.5, 0.4, 0., 1., 0.25, 0.75]), "weights[1]"),
+        ("weights", &[4, 2], f32s(&[1., 0., 0., 0., 0., 1., 0.25, 0.75]), "weights[1]"),
+        ("weights", &[4, 2], f32s(&[1., 0., -1., 2., 0., 1., 0.25, 0.75]), "weights[1]"),
+        ("kintree_table", &[2, 2], Values::I64(vec![1, 0, 0, 1]), "kintree_table[0, 0]"),
+        ("kintree_table", &[2, 2], Values::I64(vec![-1, 5, 0, 1]), "kintree_table[0, 1]"),
+        ("kintree_table", &[2, 2], Values::I64(vec![-1, 0, 0, 7]), "kintree_table[1, 1]"),
+        ("posedirs", &[4, 3, 10], f32s(&[1.0; 120]), "posedirs"),
+        ("joint_names", &[2], f32s(&[1.0; 2]), "joint_names"),
+    ];
+    for (name, shape, values, field) in cases {
+        let mut arrays = files::small_body();
+        arrays.retain(|(n, ..)| *n != name);
+        arrays.push((name, shape, values));
+        let path = write(folder, &arrays);
+        let error = body::load(&path).unwrap_err();
+        assert_eq!((error.field(), error.path()), (field, path.as_path()), "{error}");
+    }
+    let pickle = folder.join("model.pkl");
+    std::fs::write(&pickle, b"\x80\x02}q\x01").unwrap();
+    assert!(body::load(&pickle).unwrap_err().to_string().contains("pickle"));
+    assert_eq!(body::load(&folder.join("missing.npz")).unwrap_err().field(), "file");
+}
+
+#[test]
+fn poses_come_whole_or_in_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let ramp = |n: usize, first: f32| Values::F32((0..n).map(|i| first + i as f32).collect());
+    let whole = write(folder.path(), &[("thetas", &[1, 165], ramp(165, 0.0))]);
+    let whole = poses::load(&whole).unwrap();
+    let parts: [(&str, &[u64], Values); 7] = [
+        ("right_hand_pose", &[1, 45], ramp(45, 120.0)),
+        ("left_hand_pose", &[1, 45], ramp(45, 75.0)),
+        ("reye_pose", &[1, 3], ramp(3, 72.0)),
+        ("leye_pose", &[1, 3], ramp(3, 69.0)),
+        ("jaw_pose", &[1, 3], ramp(3, 66.0)),
+        ("body_pose", &[1, 63], ramp(63, 3.0)),
+        ("global_orient", &[1, 3], ramp(3, 0.0)),
+    ];
+    let joined = poses::load(&write(folder.path(), &parts)).unwrap();
+    let json = folder.path().join("transforms.json");
+    let thetas: Vec<[f64; 3]> =
+        (0..55).map(|j| std::array::from_fn(|c| f64::from(3 * j + c as u32))).collect();
+    let text =
+        serde_json::json!({ "betas": [], "poses": [{ "time": 0, "transl": [0, 0, 0], "thetas": thetas }] });
+    std::fs::write(&json, text.to_string()).unwrap();
+    let listed = poses::load(&json).unwrap();
+    let body = body::load(&crate::support::data("blender/models/anny_smplx55.npz")).unwrap();
+    let expected = whole.poses(&body.rest.skeleton).unwrap();
+    assert_eq!(joined.poses(&body.rest.skeleton).unwrap(), expected);
+    assert_eq!(listed.poses(&body.rest.skeleton).unwrap(), expected);
+    assert_eq!(whole.num_joints(), 55);
+    // Fewer joints than the body: the others rest. More: refused.
+    let short = poses::load(&write(folder.path(), &[("thetas", &[1, 66], ramp(66, 0.0))])).unwrap();
+    assert_eq!(
+        short.poses(&body.rest.skeleton).unwrap()[0].locals[22..],
+        body.rest.skeleton.rest_locals[22..]
+    );
+    let small = body::load(&crate::support::data("blender/models/anny_smpl24.npz")).unwrap();
+    assert_eq!(whole.poses(&small.rest.skeleton).unwrap_err().field(), "thetas");
+}
+
+#[test]
+fn what_is_wrong_with_poses_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let f32s = |n: usize, v: f32| Values::F32(vec![v; n]);
+    type Arrays = Vec<(&'static str, &'static [u64], Values)>;
+    let cases: Vec<(Arrays, &str)> = vec![
+        (vec![], "global_orient"),
+        (vec![("global_orient", &[1, 3], f32s(3, 0.0))], "body_pose"),
+        (vec![("thetas", &[2, 7], f32s(14, 0.0))], "thetas"),
+        (vec![("thetas", &[2, 6], f32s(12, f32::INFINITY))], "thetas[0, 0]"),
+        (vec![("thetas", &[2, 6], f32s(12, 0.0)), ("transl", &[3, 3], f32s(9, 0.0))], "transl"),
+        (
+            vec![("thetas", &[1, 6], f32s(6, 0.0)), ("betas", &[2, 2], Values::F32(vec![0., 1., 0., 2.]))],
+            "betas[1]",
+        ),
+        (
+            vec![
+                ("global_orient", &[1, 3], f32s(3, 0.0)),
+                ("body_pose", &[1, 63], f32s(63, 0.0)),
+                ("left_hand_pose", &[1, 12], f32s(12, 0.0)),
+            ],
+            "left_hand_pose",
+        ),
+    ];
+    for (arrays, field) in cases {
+        let path = write(folder.path(), &arrays);
+        let error = poses::load(&path).unwrap_err();
+        assert_eq!((error.field(), error.path()), (field, path.as_path()), "{error}");
+    }
+    let path = write(folder.path(), &[("thetas", &[1, 6], f32s(6, 0.0))]);
+    assert_eq!(poses::load_clip(&path, Some("walk")).unwrap_err().field(), "clip");
+}

@@ -1,0 +1,380 @@
+//! Fitting recipes as data: which parameters of an avatar are fitted, from what, against which loss, for how long.
+//!
+//! A recipe says nothing about code: `recipes.toml` holds those that come with the program, one section each, and a
+//! section may build on another (`base`). The strategy under which an avatar is posed while it is fitted is part of the
+//! recipe, and the only part in which the two variants of a table should differ.
+
+mod file;
+
+pub use file::RECIPES;
+
+use crate::Error;
+use serde::{Deserialize, Serialize};
+
+/// How an avatar is fitted to the frames of a training sequence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// Name; a varied recipe's is its whole specification.
+    pub id: String,
+    /// One line for people.
+    pub title: String,
+    /// Where the choices come from.
+    pub source: String,
+    /// How Gaussians are posed while they are fitted: a strategy's id or spec.
+    pub strategy: String,
+    /// SH degree that is reached in the end, 0 to 3.
+    pub sh_degree: u8,
+    /// Share of the iterations after which the SH degree is raised by one, again and again; 0 starts at the full degree.
+    pub sh_step: f32,
+    /// Iterations (one training frame each) of the method itself; profiles may allow fewer.
+    pub iterations: u32,
+    /// What is behind the avatar and the truth in the loss.
+    pub background: FitBackground,
+    /// Where the Gaussians are before the first iteration.
+    pub start: Start,
+    /// What is fitted.
+    pub free: Free,
+    /// Learning rates of Adam.
+    pub rates: Rates,
+    /// What is minimised.
+    pub loss: LossTerms,
+    /// How Gaussians come and go; their number is fixed if absent.
+    #[serde(default)]
+    pub densify: Option<Densify>,
+    /// A textured mesh that is drawn with the Gaussians; none if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<MeshLayer>,
+}
+
+/// A recipe with a budget.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitOptions {
+    /// What is fitted, and to what.
+    pub recipe: Recipe,
+    /// Number of iterations, one training frame each.
+    pub iterations: u32,
+    /// Seed of the order of frames and of backgrounds.
+    pub seed: u64,
+    /// Edges of the surface on which Gaussians start are halved until none is longer, millimetres.
+    pub edge_mm: u32,
+}
+
+impl FitOptions {
+    /// Iterations of the first stage, where there is one: a quarter of the fit's (§4.4 of the paper), but no more than
+    /// help. Its steps look at four frames each.
+    pub fn shape_iterations(&self) -> u32 {
+        (self.iterations / 4).clamp(1, MOST_SHAPE_ITERATIONS)
+    }
+}
+
+/// Beyond so many, outlines gain a ten-thousandth of their overlap and what lies between them drifts.
+const MOST_SHAPE_ITERATIONS: u32 = 400;
+
+/// What is behind the avatar and the truth in the loss.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FitBackground {
+    /// Another colour for each iteration: nothing can hide in it.
+    Random,
+    /// White.
+    White,
+    /// Black.
+    Black,
+}
+
+/// Where the Gaussians sit on the (tessellated) mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Placement {
+    /// One per vertex.
+    Vertices,
+    /// One per face, at its centroid.
+    Faces,
+}
+
+/// How the Gaussians move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BindTo {
+    /// By linear blend skinning, with the interpolated weights of the body's vertices.
+    Joints,
+    /// With the face of the body on which they sit.
+    Faces,
+}
+
+/// The surface on which the Gaussians start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Surface {
+    /// The body, its vertices moved onto the outlines in the masks.
+    Outlines,
+    /// The body, fitted to the silhouettes by gradient descent (stage 1 of the pure skinned baseline).
+    Silhouettes,
+}
+
+/// Where the Gaussians are before the first iteration. Their colours are gathered from the training frames.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Start {
+    /// The surface.
+    pub surface: Surface,
+    /// Where they sit on it.
+    pub placement: Placement,
+    /// How they move.
+    pub bind_to: BindTo,
+    /// Standard deviations in the tangent plane, in units of those of the part of the surface that a Gaussian stands for.
+    pub scale: f64,
+    /// Standard deviation along the normal, in units of the mean one in the tangent plane.
+    pub thickness: f64,
+    /// Opacity, in (0, 1).
+    pub opacity: f64,
+    /// How far below the surface, in pixels of the training frames.
+    pub inset: f64,
+}
+
+/// What is fitted. Colours always are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Free {
+    /// How Gaussians may move in the rest pose.
+    pub position: FreePosition,
+    /// How they may turn.
+    pub rotation: FreeRotation,
+    /// Whether their standard deviations change.
+    pub scale: FreeScale,
+    /// Whether their opacities change.
+    pub opacity: bool,
+}
+
+/// How Gaussians may move in the rest pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FreePosition {
+    /// Not at all.
+    Fixed,
+    /// Anywhere. Face-bound Gaussians slide in their triangle's plane and along the normal.
+    Free,
+    /// Along the normal of the surface on which they started.
+    AlongNormal,
+}
+
+/// How Gaussians may turn in the rest pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FreeRotation {
+    /// Not at all.
+    Fixed,
+    /// About the normal of the surface on which they started: one angle (iHuman).
+    AboutNormal,
+    /// Anyhow: a quaternion.
+    Quaternion,
+}
+
+/// How the standard deviations of a Gaussian may change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FreeScale {
+    /// Not at all.
+    Fixed,
+    /// Those in the tangent plane (iHuman).
+    InPlane,
+    /// All three.
+    All,
+}
+
+/// Learning rates of Adam (β 0.9 and 0.999), per iteration, in the units of the stored parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rates {
+    /// Positions at the first iteration, metres.
+    pub position: f32,
+    /// Positions at the last iteration; in between the rate falls by a constant factor per iteration.
+    pub position_last: f32,
+    /// Raw quaternions, or the angle in radians.
+    pub rotation: f32,
+    /// Log standard deviations.
+    pub scale: f32,
+    /// Opacity logits.
+    pub opacity: f32,
+    /// SH coefficients of degree 0.
+    pub colour: f32,
+    /// Other SH coefficients.
+    pub colour_rest: f32,
+}
+
+/// Weights of what is minimised: `(1 - ssim) L1 + ssim (1 - SSIM)` on colour plus the terms below.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LossTerms {
+    /// Share of `1 - SSIM` in the colour term.
+    pub ssim: f32,
+    /// Of the L1 distance of the silhouettes.
+    pub silhouette: f32,
+    /// Of the mean of `max(longest/shortest - ratio, 0) + max(longest - limit, 0)` over Gaussians (SplattingAvatar), with
+    /// `longest` and `shortest` of the two larger standard deviations, `limit` in metres.
+    pub long_thin: f32,
+    /// The ratio above which a Gaussian counts as long and thin.
+    pub long_thin_ratio: f32,
+    /// The standard deviation above which a Gaussian counts as long, metres.
+    pub long_thin_limit: f32,
+    /// Of the mean squared standard deviation, per square metre.
+    pub scale: f32,
+    /// Of the mean squared opacity.
+    pub opacity: f32,
+    /// Of the mean squared distance from where the Gaussians started, per square metre.
+    pub displacement: f32,
+    /// Of the mean over Gaussians of the squared norm of their SH coefficients beyond degree 0: directions from which
+    /// nothing was seen look like those from which something was.
+    pub sh_rest: f32,
+}
+
+/// A textured mesh that is drawn with the Gaussians (HAHA): the body, its vertices moved onto the outlines in the masks,
+/// under a texture that is gathered from the training frames and then fitted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshLayer {
+    /// Side of the texture, texels.
+    pub texture: u32,
+    /// Learning rate of the texels' colours; 0 leaves them as gathered.
+    pub rate: f32,
+}
+
+/// How Gaussians come and go: adaptive density control of 3DGS, on a body.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Densify {
+    /// Share of the iterations before the first change.
+    pub from: f32,
+    /// Share of the iterations after the last one.
+    pub until: f32,
+    /// Number of changes in between.
+    pub rounds: u32,
+    /// Gaussians whose mean gradient on screen (per half image) is larger are cloned or split.
+    pub gradient: f32,
+    /// Gaussians with a standard deviation above this are split, others cloned, metres.
+    pub split_above: f32,
+    /// Gaussians less opaque than this are removed.
+    pub prune_opacity: f32,
+    /// No more Gaussians than this times the number at the start.
+    pub most: f32,
+    /// Whether face-bound Gaussians walk onto the triangle that they slide into (SplattingAvatar).
+    pub walk: bool,
+}
+
+impl Recipe {
+    /// The recipe of this name, or with other choices: `hugs-like`, `hugs-like+rates.rotation=0.01+free.opacity=false`.
+    /// Fields and values are those of `recipes.toml`.
+    ///
+    /// # Errors
+    /// An unknown recipe, field or value, or a number out of range.
+    pub fn parse(specification: &str) -> Result<Self, Error> {
+        file::parse(specification)
+    }
+
+    /// The SH degree in force at an iteration out of a number.
+    pub fn sh_degree_at(&self, iteration: u32, iterations: u32) -> usize {
+        let full = usize::from(self.sh_degree);
+        let step = (f64::from(self.sh_step) * f64::from(iterations)).round() as u32;
+        iteration.checked_div(step).map_or(full, |raised| full.min(raised as usize))
+    }
+
+    /// The recipe without its names: what a fit depends on.
+    pub fn choices(&self) -> Self {
+        Self { id: String::new(), title: String::new(), source: String::new(), ..self.clone() }
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Names the first field out of range.
+    pub fn check(&self) -> Result<(), Error> {
+        let Self { start, rates, loss, .. } = self;
+        let positive = [
+            ("start.scale", start.scale),
+            ("start.thickness", start.thickness),
+            ("start.opacity", start.opacity),
+            ("loss.long_thin_ratio", f64::from(loss.long_thin_ratio)),
+            ("loss.long_thin_limit", f64::from(loss.long_thin_limit)),
+            ("iterations", f64::from(self.iterations)),
+        ];
+        let not_negative = [
+            ("rates.position", rates.position),
+            ("rates.position_last", rates.position_last),
+            ("rates.rotation", rates.rotation),
+            ("rates.scale", rates.scale),
+            ("rates.opacity", rates.opacity),
+            ("rates.colour", rates.colour),
+            ("rates.colour_rest", rates.colour_rest),
+            ("loss.silhouette", loss.silhouette),
+            ("loss.long_thin", loss.long_thin),
+            ("loss.scale", loss.scale),
+            ("loss.opacity", loss.opacity),
+            ("loss.displacement", loss.displacement),
+            ("loss.sh_rest", loss.sh_rest),
+        ];
+        let shares = [("sh_step", self.sh_step), ("loss.ssim", loss.ssim)];
+        let refuse = |key: &str, value: String, expected: &str| {
+            Err(Error::invalid(format!("recipe {}: {key}", self.id), value, expected))
+        };
+        if let Some((key, value)) = positive.iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
+            return refuse(key, value.to_string(), "a finite number above 0");
+        }
+        if let Some((key, value)) = not_negative.iter().find(|(_, v)| !(v.is_finite() && *v >= 0.0)) {
+            return refuse(key, value.to_string(), "a finite number, at least 0");
+        }
+        if let Some((key, value)) = shares.iter().find(|(_, v)| !(0.0..=1.0).contains(v)) {
+            return refuse(key, value.to_string(), "0 to 1");
+        }
+        if start.opacity >= 1.0 {
+            return refuse("start.opacity", start.opacity.to_string(), "below 1");
+        }
+        if !start.inset.is_finite() {
+            return refuse("start.inset", start.inset.to_string(), "a finite number of pixels");
+        }
+        if self.sh_degree > 3 {
+            return refuse("sh_degree", self.sh_degree.to_string(), "0 to 3");
+        }
+        if self.strategy.parse::<skinsplat_posing::Strategy>().is_err() {
+            return refuse("strategy", format!("`{}`", self.strategy), "the id or spec of a strategy");
+        }
+        let tied = self.free.position == FreePosition::AlongNormal
+            || self.free.rotation == FreeRotation::AboutNormal;
+        if self.densify.is_some() && tied {
+            let expected = "free.position and free.rotation that are not measured from the start";
+            return refuse("densify", "new Gaussians have no start".to_owned(), expected);
+        }
+        if let Some(mesh) = &self.mesh {
+            if mesh.texture == 0 {
+                return refuse("mesh.texture", mesh.texture.to_string(), "at least 1 texel");
+            }
+            if !(mesh.rate.is_finite() && mesh.rate >= 0.0) {
+                return refuse("mesh.rate", mesh.rate.to_string(), "a finite number, at least 0");
+            }
+        }
+        self.densify.as_ref().map_or(Ok(()), |densify| densify.check(&self.id))
+    }
+}
+
+impl Densify {
+    fn check(&self, id: &str) -> Result<(), Error> {
+        let refuse = |key: &str, value: f32, expected: &str| {
+            Err(Error::invalid(format!("recipe {id}: densify.{key}"), value.to_string(), expected))
+        };
+        if !(0.0 <= self.from && self.from < self.until && self.until <= 1.0) {
+            return refuse("from", self.from, "shares with 0 <= from < until <= 1");
+        }
+        let positive = [("gradient", self.gradient), ("split_above", self.split_above)];
+        if let Some((key, value)) = positive.iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
+            return refuse(key, *value, "a finite number above 0");
+        }
+        if !(self.most.is_finite() && self.most >= 1.0) {
+            return refuse("most", self.most, "a finite number, at least 1");
+        }
+        if !(0.0..1.0).contains(&self.prune_opacity) {
+            return refuse("prune_opacity", self.prune_opacity, "at least 0, below 1");
+        }
+        Ok(())
+    }
+}

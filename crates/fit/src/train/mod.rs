@@ -1,0 +1,401 @@
+//! Fitting an avatar to training frames by gradient descent: the road of an evaluation, walked forwards and backwards.
+//!
+//! One iteration poses the avatar as one training frame shows it, renders it, compares, walks the derivatives back to the
+//! stored parameters and takes a step of Adam. What may change and what is minimised is the recipe's business.
+//! Everything random is a function of the seed and the iteration, so that a fit which is resumed from a checkpoint ends
+//! in the same bits as one that was never interrupted.
+
+mod checkpoint;
+mod density;
+mod frames;
+mod layer;
+mod parameters;
+mod regularise;
+mod walk;
+
+pub use checkpoint::Checkpoint;
+
+use super::Error;
+use super::loss::{FrameLoss, Losses, Weights};
+use super::shape::{Ended, ShapeFit, fit_shape};
+use super::surface::{SurfaceInit, surface_init};
+use super::texture::TexturedBody;
+use crate::recipe::FitOptions;
+use crate::recipe::{FitBackground, Surface};
+use density::Density;
+use frames::TrainingFrames;
+use layer::Layer;
+use parameters::{Parameters, RatesNow};
+use serde::{Deserialize, Serialize};
+use skinsplat_core::math::random::SplitMix64;
+use skinsplat_core::scene::{
+    Avatar, AvatarGradient, Binding, Image, Mask, PosedBody, PosedGradient, Rendered, RenderedGradient,
+    RestBody,
+};
+use skinsplat_data::sequence::Sequence;
+use skinsplat_posing::{BoundAvatar, Strategy, pose, pose_backward};
+use skinsplat_render::mesh::Drawing;
+use skinsplat_render::splat::{Derivatives, RenderSettings, Renderer};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// Iterations between two bindings of the avatar to its body.
+const BETWEEN_BINDINGS: u32 = 50;
+
+/// What an iteration did.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// Iterations so far.
+    pub iteration: u32,
+    /// Of this many.
+    pub iterations: u32,
+    /// What was minimised, regularisers included.
+    pub loss: f64,
+    /// PSNR on this iteration's training frame before the step, dB.
+    pub psnr: f64,
+    /// Number of Gaussians.
+    pub splats: usize,
+}
+
+/// An avatar as a fit leaves it.
+#[derive(Clone, Copy, Debug)]
+pub struct Fitted<'a> {
+    /// The Gaussians.
+    pub avatar: &'a Avatar,
+    /// The mesh that is drawn with them, of a hybrid.
+    pub mesh: Option<&'a TexturedBody>,
+}
+
+impl<'a> From<&'a Avatar> for Fitted<'a> {
+    fn from(avatar: &'a Avatar) -> Self {
+        Self { avatar, mesh: None }
+    }
+}
+
+/// An optimisation in progress.
+pub struct Trainer<'a> {
+    sequence: &'a Sequence,
+    options: &'a FitOptions,
+    strategy: Strategy,
+    parameters: Parameters,
+    density: Density,
+    layer: Option<Layer>,
+    iteration: u32,
+    bound: BoundAvatar,
+    frames: TrainingFrames<'a>,
+    warnings: Vec<String>,
+    scratch: Scratch,
+}
+
+/// Memory that is kept from iteration to iteration.
+struct Scratch {
+    renderer: Renderer,
+    rendered: Rendered,
+    truth: Image,
+    losses: Losses,
+    of_rendered: RenderedGradient,
+    of_posed: PosedGradient,
+    of_avatar: AvatarGradient,
+}
+
+/// The avatar with which a recipe starts.
+///
+/// # Errors
+/// As [`surface_init`] and [`fit_shape`]; a shape fit that diverges.
+pub fn start(sequence: &Sequence, options: &FitOptions) -> Result<Avatar, Error> {
+    let start = &options.recipe.start;
+    let init = SurfaceInit {
+        placement: start.placement,
+        bind_to: start.bind_to,
+        longest_edge: f64::from(options.edge_mm) / 1000.0,
+        scale: start.scale,
+        thickness: start.thickness,
+        opacity: start.opacity,
+        inset: start.inset,
+        sh_degree: 0,
+        refinements: 0,
+        ..SurfaceInit::default()
+    };
+    match start.surface {
+        Surface::Outlines => surface_init(sequence, &init),
+        Surface::Silhouettes => {
+            let settings = ShapeFit {
+                iterations: options.shape_iterations() as usize,
+                seed: options.seed,
+                ..ShapeFit::default()
+            };
+            let shape = fit_shape(sequence, &settings, &mut |_| ControlFlow::Continue(()))?;
+            if let Ended::NotFinite { iteration, frame } = shape.ended {
+                return Err(Error::Diverged {
+                    sequence: sequence.id.clone(),
+                    iteration: u32::try_from(iteration).unwrap_or(u32::MAX),
+                    frame,
+                    parameter: "offset of the surface".to_owned(),
+                });
+            }
+            let dressed = Sequence { body: Arc::new(shape.body), ..sequence.clone() };
+            surface_init(&dressed, &SurfaceInit { outline_rounds: 0, ..init })
+        }
+    }
+}
+
+impl<'a> Trainer<'a> {
+    /// Prepares the first iteration on an avatar, usually that of [`start`]. The mesh of a hybrid is made here.
+    ///
+    /// # Errors
+    /// An avatar or body that breaks an invariant, a recipe that does not suit it, a sequence without frames; as
+    /// [`gather_texture`](super::texture::gather_texture) for a hybrid.
+    pub fn new(sequence: &'a Sequence, options: &'a FitOptions, avatar: Avatar) -> Result<Self, Error> {
+        let edge = mean_edge(&sequence.body);
+        let parameters = Parameters::new(avatar, edge, &options.recipe.free);
+        let density = Density::new(parameters.len());
+        let layer = options.recipe.mesh.as_ref().map(|mesh| Layer::new(sequence, mesh)).transpose()?;
+        Self::with_state(sequence, options, (parameters, density, layer), 0)
+    }
+
+    /// Goes on from a checkpoint of the same sequence and options.
+    ///
+    /// # Errors
+    /// A checkpoint of another fit; otherwise as [`Trainer::new`].
+    pub fn resume(
+        sequence: &'a Sequence,
+        options: &'a FitOptions,
+        checkpoint: Checkpoint,
+    ) -> Result<Self, Error> {
+        let Checkpoint { parameters, density, layer, iteration, .. } =
+            checkpoint.matching(sequence, options)?;
+        let layer = match (&options.recipe.mesh, layer) {
+            (Some(mesh), Some(state)) => Some(Layer::resume(sequence, mesh, state)?),
+            _ => None,
+        };
+        Self::with_state(sequence, options, (parameters, density, layer), iteration)
+    }
+
+    fn with_state(
+        sequence: &'a Sequence,
+        options: &'a FitOptions,
+        (parameters, density, layer): (Parameters, Density, Option<Layer>),
+        iteration: u32,
+    ) -> Result<Self, Error> {
+        options
+            .recipe
+            .check()
+            .map_err(|error| Error::invalid("recipe", error.to_string(), "a sound recipe"))?;
+        if sequence.frames.is_empty() {
+            let field = format!("sequence {}: frames", sequence.id);
+            return Err(Error::invalid(field, "none", "at least one"));
+        }
+        let strategy = options.recipe.strategy.parse::<Strategy>().map_err(Error::strategy(sequence))?;
+        let bound =
+            BoundAvatar::new(&parameters.avatar, &sequence.body).map_err(Error::strategy(sequence))?;
+        Ok(Self {
+            sequence,
+            options,
+            strategy,
+            parameters,
+            density,
+            layer,
+            iteration,
+            bound,
+            frames: TrainingFrames::new(sequence, options.seed),
+            warnings: Vec::new(),
+            scratch: Scratch::new(),
+        })
+    }
+
+    /// True after the last iteration.
+    pub fn is_done(&self) -> bool {
+        self.iteration >= self.options.iterations
+    }
+
+    /// True before every fiftieth iteration, when the avatar is bound anew: Gaussians that have moved meet other faces and
+    /// skinning weights. Only a checkpoint of such a moment continues in the same bits.
+    pub fn is_resting(&self) -> bool {
+        self.iteration.is_multiple_of(BETWEEN_BINDINGS)
+    }
+
+    /// The avatar as it stands.
+    pub fn avatar(&self) -> &Avatar {
+        &self.parameters.avatar
+    }
+
+    /// The avatar as it stands, with its mesh.
+    pub fn fitted(&self) -> Fitted<'_> {
+        Fitted { avatar: self.avatar(), mesh: self.layer.as_ref().map(|layer| &layer.textured) }
+    }
+
+    /// Warnings since they were last taken.
+    pub fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
+    }
+
+    /// Everything that a later [`Trainer::resume`] needs, at a moment that [`Trainer::is_resting`].
+    pub fn checkpoint(&self) -> Checkpoint {
+        Checkpoint::new(
+            self.sequence,
+            self.options,
+            self.parameters.clone(),
+            self.density.clone(),
+            self.layer.as_ref().map(Layer::state),
+            self.iteration,
+        )
+    }
+
+    /// One iteration.
+    ///
+    /// # Errors
+    /// A frame that cannot be read, no frame that shows the body, a loss or a parameter that is not finite.
+    pub fn step(&mut self) -> Result<Step, Error> {
+        let (recipe, iterations) = (&self.options.recipe, self.options.iterations);
+        self.parameters.raise_sh_degree(recipe.sh_degree_at(self.iteration, iterations));
+        let in_strategy = Error::strategy(self.sequence);
+        if self.is_resting() {
+            self.bound =
+                BoundAvatar::new(&self.parameters.avatar, &self.sequence.body).map_err(&in_strategy)?;
+        } else {
+            self.bound.update(&self.parameters.avatar).map_err(&in_strategy)?;
+        }
+        let frame = self.frames.of_iteration(self.iteration as usize, &mut self.warnings)?;
+        let body = PosedBody::new(&self.sequence.body, frame.pose).map_err(Error::scene(self.sequence))?;
+        let posed = pose(&self.bound, &body, &self.strategy).map_err(&in_strategy)?;
+        let background = background(recipe.background, self.options.seed, self.iteration);
+        let settings = RenderSettings { background, antialiased: false };
+        let scratch = &mut self.scratch;
+        let in_scene = Error::scene(self.sequence);
+        let drawing = self.layer.as_ref().map(|layer| layer.draw(frame.pose, frame.camera));
+        let drawing = drawing.transpose().map_err(&in_scene)?;
+        let underlay = drawing.as_ref().map(Drawing::underlay);
+        let Scratch { renderer, rendered, .. } = scratch;
+        match (&underlay, &mut self.layer) {
+            (Some(underlay), Some(layer)) => {
+                let shown = &mut layer.shown;
+                renderer.render_over(&posed, frame.camera, &settings, underlay, rendered, shown);
+            }
+            _ => renderer.render_into(&posed, frame.camera, &settings, rendered),
+        }
+        composite(&frame.truth.rgb, &frame.truth.alpha, background, &mut scratch.truth);
+        let Rendered { image, alpha, .. } = &scratch.rendered;
+        let weights = Weights { ssim: recipe.loss.ssim, silhouette: recipe.loss.silhouette };
+        let truth = (&scratch.truth, &frame.truth.alpha);
+        let loss = scratch.losses.frame((image, alpha), truth, &weights, &mut scratch.of_rendered);
+        let Scratch { renderer, rendered, of_rendered, of_posed, .. } = scratch;
+        let (camera, exact) = (frame.camera, Derivatives::Exact);
+        match &underlay {
+            Some(underlay) => renderer.backward_over(
+                &posed,
+                camera,
+                &settings,
+                underlay,
+                rendered,
+                of_rendered,
+                exact,
+                of_posed,
+            ),
+            None => renderer.backward(&posed, camera, &settings, rendered, of_rendered, exact, of_posed),
+        }
+        if let Some(layer) = &mut self.layer {
+            layer.step(frame.pose, camera, &of_rendered.image).map_err(&in_scene)?;
+        }
+        let Avatar { gaussians, binding } = &self.parameters.avatar;
+        scratch.of_avatar.reset(gaussians, matches!(binding, Binding::Face(_)));
+        let upstream = &scratch.of_posed;
+        pose_backward(&self.bound, &body, &self.strategy, gaussians, upstream, &mut scratch.of_avatar)
+            .map_err(&in_strategy)?;
+        let frame_name = frame.name.to_owned();
+        drop(posed);
+        self.finish(loss, &frame_name)
+    }
+
+    /// The second half of an iteration: regularisers, the step, Gaussians that come and go.
+    fn finish(&mut self, loss: FrameLoss, frame: &str) -> Result<Step, Error> {
+        let (recipe, iterations) = (&self.options.recipe, self.options.iterations);
+        let Parameters { avatar, start, .. } = &self.parameters;
+        let penalty = regularise::add(&recipe.loss, avatar, start, &mut self.scratch.of_avatar);
+        let total = loss.total + penalty;
+        let rates = RatesNow::of(recipe, self.iteration, iterations);
+        self.density.observe(&self.scratch.of_posed);
+        self.parameters.step(&mut self.scratch.of_avatar, &recipe.free, &rates);
+        if !total.is_finite() || self.parameters.broken().is_some() {
+            return Err(self.diverged(frame));
+        }
+        self.iteration += 1;
+        if let Some(settings) = &recipe.densify
+            && density::is_due(settings, self.iteration, iterations)
+        {
+            density::change(settings, &mut self.parameters, &mut self.density, &self.sequence.body)
+                .map_err(Error::scene(self.sequence))?;
+            self.bound = BoundAvatar::new(&self.parameters.avatar, &self.sequence.body)
+                .map_err(Error::strategy(self.sequence))?;
+        }
+        Ok(Step {
+            iteration: self.iteration,
+            iterations,
+            loss: total,
+            psnr: -10.0 * loss.mse.max(1e-12).log10(),
+            splats: self.parameters.len(),
+        })
+    }
+
+    fn diverged(&self, frame: &str) -> Error {
+        let parameter = match self.parameters.broken() {
+            Some((name, gaussian)) => format!("{name} of Gaussian {gaussian}"),
+            None => "no parameter yet, only the loss".to_owned(),
+        };
+        Error::Diverged {
+            sequence: self.sequence.id.clone(),
+            iteration: self.iteration,
+            frame: frame.to_owned(),
+            parameter,
+        }
+    }
+}
+
+impl Scratch {
+    fn new() -> Self {
+        let image = || Image::filled(1, 1, [0.0; 3]);
+        let mask = || Mask::filled(1, 1, 0.0);
+        Self {
+            renderer: Renderer::new(),
+            rendered: Rendered { image: image(), alpha: mask(), depth: mask() },
+            truth: image(),
+            losses: Losses::default(),
+            of_rendered: RenderedGradient { image: image(), alpha: None },
+            of_posed: PosedGradient::default(),
+            of_avatar: AvatarGradient::default(),
+        }
+    }
+}
+
+/// The colour behind avatar and truth.
+fn background(choice: FitBackground, seed: u64, iteration: u32) -> [f32; 3] {
+    match choice {
+        FitBackground::White => [1.0; 3],
+        FitBackground::Black => [0.0; 3],
+        FitBackground::Random => {
+            let mut random =
+                SplitMix64::new(!seed ^ u64::from(iteration).wrapping_mul(0xD6E8_FEB8_6659_FD93));
+            random.next_u64();
+            [random.unit_f32(), random.unit_f32(), random.unit_f32()]
+        }
+    }
+}
+
+/// Straight colours over a background, into memory that is kept.
+fn composite(rgb: &Image, alpha: &Mask, background: [f32; 3], out: &mut Image) {
+    if (out.width(), out.height()) != (rgb.width(), rgb.height()) {
+        *out = Image::filled(rgb.width(), rgb.height(), background);
+    }
+    let pixels = rgb.pixels().iter().zip(alpha.values());
+    for (out, (colour, &a)) in out.pixels_mut().iter_mut().zip(pixels) {
+        *out = [0, 1, 2].map(|c| a * colour[c] + (1.0 - a) * background[c]);
+    }
+}
+
+/// Mean edge of a body's faces, metres; 1 if it has none.
+fn mean_edge(body: &RestBody) -> f32 {
+    let edges = body.faces.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+    let lengths: Vec<f64> =
+        edges.map(|(a, b)| body.vertices[a as usize].distance(body.vertices[b as usize])).collect();
+    let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
+    if mean > 0.0 { mean as f32 } else { 1.0 }
+}

@@ -1,0 +1,188 @@
+//! Terms of the loss that look at the parameters and not at images, with their derivatives.
+
+use super::parameters::Origin;
+use crate::recipe::LossTerms;
+use glam::Vec3;
+use rayon::prelude::*;
+use skinsplat_core::scene::{Avatar, AvatarGradient, Binding};
+
+/// Adds the derivatives of all terms to `gradient` and returns their weighted sum.
+pub(super) fn add(
+    terms: &LossTerms,
+    avatar: &Avatar,
+    origins: &[Origin],
+    gradient: &mut AvatarGradient,
+) -> f64 {
+    let n = avatar.gaussians.len() as f32;
+    let mut total = 0.0;
+    if terms.long_thin > 0.0 || terms.scale > 0.0 {
+        for (log_scale, out) in avatar.gaussians.log_scales.iter().zip(&mut gradient.log_scales) {
+            let scale = log_scale.map(f32::exp);
+            let square = scale * scale;
+            let weight = terms.scale / (3.0 * n);
+            total += f64::from(weight * square.element_sum());
+            *out += 2.0 * weight * square;
+            total += f64::from(long_thin(terms, scale, terms.long_thin / n, out));
+        }
+    }
+    if terms.opacity > 0.0 {
+        let weight = terms.opacity / n;
+        for (logit, out) in avatar.gaussians.opacity_logits.iter().zip(&mut gradient.opacity_logits) {
+            let opacity = 1.0 / (1.0 + (-logit).exp());
+            total += f64::from(weight * opacity * opacity);
+            *out += 2.0 * weight * opacity * opacity * (1.0 - opacity);
+        }
+    }
+    if terms.sh_rest > 0.0 {
+        total += sh_rest(terms.sh_rest / n, avatar, gradient);
+    }
+    if terms.displacement > 0.0 {
+        total += displacement(terms.displacement / n, avatar, origins, gradient);
+    }
+    total
+}
+
+/// `weight` times `max(a/b - ratio, 0) + max(a - limit, 0)` for the largest standard deviation a and the second b.
+fn long_thin(terms: &LossTerms, scale: Vec3, weight: f32, out: &mut Vec3) -> f32 {
+    if weight == 0.0 {
+        return 0.0;
+    }
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| scale[j].total_cmp(&scale[i]));
+    let [first, second, _] = order;
+    let (long, short) = (scale[first], scale[second]);
+    let (excess, beyond) = (long / short - terms.long_thin_ratio, long - terms.long_thin_limit);
+    let mut value = 0.0;
+    if excess > 0.0 {
+        value += weight * excess;
+        out[first] += weight * long / short;
+        out[second] -= weight * long / short;
+    }
+    if beyond > 0.0 {
+        value += weight * beyond;
+        out[first] += weight * long;
+    }
+    value
+}
+
+/// `weight` times the sum of the squared SH coefficients beyond degree 0. In parts of fixed size, so that the sum does not
+/// depend on the number of threads.
+fn sh_rest(weight: f32, avatar: &Avatar, gradient: &mut AvatarGradient) -> f64 {
+    const PART: usize = 4096;
+    let count = avatar.gaussians.sh_count();
+    let parts = avatar.gaussians.sh.par_chunks(PART * count).zip(gradient.sh.par_chunks_mut(PART * count));
+    let sums: Vec<f64> = parts
+        .map(|(own, out)| {
+            let rows = own.chunks_exact(count).zip(out.chunks_exact_mut(count));
+            rows.map(|(own, out)| {
+                let mut sum = 0.0;
+                for (own, out) in own[1..].as_flattened().iter().zip(out[1..].as_flattened_mut()) {
+                    sum += own * own;
+                    *out += 2.0 * weight * own;
+                }
+                f64::from(sum)
+            })
+            .sum()
+        })
+        .collect();
+    f64::from(weight) * sums.iter().sum::<f64>()
+}
+
+/// `weight` times the sum of the squared distances from the start (of face-bound Gaussians: along the normal).
+fn displacement(weight: f32, avatar: &Avatar, origins: &[Origin], gradient: &mut AvatarGradient) -> f64 {
+    let mut total = 0.0;
+    match &avatar.binding {
+        Binding::Static => {}
+        Binding::Vertex(_) => {
+            let moved = avatar.gaussians.means.iter().zip(origins).zip(&mut gradient.means);
+            for ((mean, origin), out) in moved {
+                let way = *mean - origin.mean;
+                total += f64::from(weight * way.length_squared());
+                *out += 2.0 * weight * way;
+            }
+        }
+        Binding::Face(binding) => {
+            let moved = binding.offsets.iter().zip(origins).zip(&mut gradient.offsets);
+            for ((offset, origin), out) in moved {
+                let way = offset - origin.height;
+                total += f64::from(weight * way * way);
+                *out += 2.0 * weight * way;
+            }
+        }
+    }
+    total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recipe::Recipe;
+    use skinsplat_core::scene::{FaceBinding, Gaussians};
+
+    fn avatar() -> Avatar {
+        let scales = [[0.02f32, 0.001, 0.0004], [0.0025, 0.03, 0.001], [0.004, 0.0041, 0.0039]];
+        let gaussians = Gaussians {
+            means: vec![Vec3::new(0.1, 0.2, 0.3); 3],
+            rotations: vec![[1.0, 0.0, 0.0, 0.0]; 3],
+            log_scales: scales.map(|s| Vec3::from_array(s).map(f32::ln)).to_vec(),
+            opacity_logits: vec![0.5, -1.0, 3.0],
+            sh_degree: 1,
+            sh: (0..12).map(|i| [0.1 * i as f32, -0.3, 0.2]).collect(),
+        };
+        let binding = Binding::Face(FaceBinding {
+            faces: vec![0; 3],
+            barycentric: vec![[1.0, 0.0, 0.0]; 3],
+            offsets: vec![0.01, -0.02, 0.0],
+        });
+        Avatar { gaussians, binding }
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_value() {
+        let recipe = Recipe::parse(
+            "pure-skinned+loss.long_thin=0.3+loss.scale=40.0+loss.opacity=0.2+loss.sh_rest=0.7",
+        )
+        .expect("known");
+        let terms = LossTerms { displacement: 5.0, ..recipe.loss };
+        let mut moved = avatar();
+        let origins = Origin::of(&moved);
+        if let Binding::Face(binding) = &mut moved.binding {
+            binding.offsets = vec![0.015, -0.01, 0.002];
+        }
+        let value = |avatar: &Avatar| {
+            let mut gradient = AvatarGradient::default();
+            gradient.reset(&avatar.gaussians, true);
+            (add(&terms, avatar, &origins, &mut gradient), gradient)
+        };
+        let (_, gradient) = value(&moved);
+        let step = 1e-2f32;
+        let check = |change: &dyn Fn(&mut Avatar, f32), found: f32| {
+            let at = |h: f32| {
+                let mut other = moved.clone();
+                change(&mut other, h);
+                value(&other).0
+            };
+            let expected = (at(step) - at(-step)) / f64::from(2.0 * step);
+            assert!(
+                (f64::from(found) - expected).abs() < 1e-3 * expected.abs().max(1e-3),
+                "{found} {expected}"
+            );
+        };
+        for i in 0..3 {
+            for axis in 0..3 {
+                let change = |a: &mut Avatar, h: f32| a.gaussians.log_scales[i][axis] += h;
+                check(&change, gradient.log_scales[i][axis]);
+            }
+            check(&|a, h| a.gaussians.opacity_logits[i] += h, gradient.opacity_logits[i]);
+            for k in 4 * i..4 * i + 4 {
+                check(&|a, h| a.gaussians.sh[k][1] += h, gradient.sh[k][1]);
+            }
+            let change = |a: &mut Avatar, h: f32| {
+                if let Binding::Face(binding) = &mut a.binding {
+                    binding.offsets[i] += h;
+                }
+            };
+            check(&change, gradient.offsets[i]);
+        }
+    }
+}

@@ -1,0 +1,422 @@
+//! One frame under a protocol.
+
+use super::planes::{check_mask, exact_level};
+use super::region::{bounding_box, inside};
+use super::ssim::ssim_of_planes;
+use super::{Background, ErrorSums, MetricsError, PerceptualDistance, Planes, Protocol, ProtocolId, Region};
+use serde::{Deserialize, Serialize};
+use skinsplat_core::scene::{Image, Mask};
+
+/// The ground truth of a frame.
+#[derive(Clone, Copy, Debug)]
+pub enum Truth<'a> {
+    /// Straight (un-premultiplied) colours and their alpha: composited over the protocol's background, and alpha is the
+    /// mask of the regions. With a captured background the colours are scored as they are.
+    Straight {
+        /// Colours.
+        rgb: &'a Image,
+        /// Alpha, and mask.
+        alpha: &'a Mask,
+    },
+    /// A finished image, scored as it is, and a mask for the regions that need one.
+    Composited {
+        /// Colours.
+        rgb: &'a Image,
+        /// Mask.
+        mask: Option<&'a Mask>,
+    },
+}
+
+impl<'a> Truth<'a> {
+    fn rgb(&self) -> &'a Image {
+        match self {
+            Self::Straight { rgb, .. } | Self::Composited { rgb, .. } => rgb,
+        }
+    }
+
+    fn mask(&self) -> Option<&'a Mask> {
+        match self {
+            Self::Straight { alpha, .. } => Some(alpha),
+            Self::Composited { mask, .. } => *mask,
+        }
+    }
+}
+
+/// The metrics of one frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameScore {
+    /// The protocol that it was scored under.
+    pub protocol: ProtocolId,
+    /// Pixels that were compared.
+    pub pixels: u64,
+    /// Mean squared error of R, G and B, from which any aggregation can be made later.
+    pub channel_mse: [f64; 3],
+    /// Mean squared error over all values.
+    pub mse: f64,
+    /// dB; +inf for identical images, which JSON holds as `null`.
+    #[serde(with = "infinite_as_null")]
+    pub psnr: f64,
+    /// SSIM; `None` (`null`) means "not computed".
+    pub ssim: Option<f64>,
+    /// LPIPS; `None` (`null`) means "not computed".
+    pub lpips: Option<f64>,
+    /// Why a scorer that was there has not computed it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lpips_missing: Option<String>,
+}
+
+/// What is computed of a frame besides the squared error.
+#[derive(Clone, Copy)]
+pub struct Wanted<'a> {
+    /// SSIM.
+    pub ssim: bool,
+    /// LPIPS, by this scorer.
+    pub lpips: Option<&'a dyn PerceptualDistance>,
+}
+
+/// The two images as the metrics see them, after steps 1 to 3 of [`Protocol`].
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// The render.
+    pub render: Planes,
+    /// The truth.
+    pub truth: Planes,
+    /// For [`Region::Mask`]: 1 for pixels that count, 0 for others.
+    pub weights: Option<Vec<f64>>,
+}
+
+impl Protocol {
+    /// Scores a render, which was drawn over [`Protocol::background_colour`], without LPIPS.
+    ///
+    /// # Errors
+    /// Images or masks of different sizes, values that are not finite, a missing or empty mask where the region needs
+    /// one, a region too small for the SSIM window.
+    pub fn score(&self, render: &Image, truth: Truth<'_>) -> Result<FrameScore, MetricsError> {
+        self.score_with(render, truth, Wanted { ssim: true, lpips: None })
+    }
+
+    /// What is wanted. LPIPS stays `None`, and the score says why, if there are no weights for its network, if the image
+    /// is too small for it, and in [`Region::Mask`], since LPIPS has no masked form.
+    ///
+    /// # Errors
+    /// As [`Protocol::score`], and other errors of the scorer.
+    pub fn score_with(
+        &self,
+        render: &Image,
+        truth: Truth<'_>,
+        wanted: Wanted<'_>,
+    ) -> Result<FrameScore, MetricsError> {
+        let Prepared { render, truth, weights } = self.prepare(render, truth)?;
+        let sums = ErrorSums::new(&render, &truth, weights.as_deref())?;
+        let ssim = wanted.ssim.then(|| {
+            ssim_of_planes(&render, &truth, &self.ssim.settings(), self.ssim.id(), weights.as_deref())
+        });
+        let distance = wanted.lpips.map(|scorer| match weights {
+            None => scorer.distance(&render, &truth, self.lpips),
+            Some(_) => Err(MetricsError::NoImage { region: self.region.id() }),
+        });
+        let (lpips, lpips_missing) = match distance {
+            None => (None, None),
+            Some(Ok(distance)) => (Some(distance), None),
+            Some(Err(error)) if error.leaves_lpips_open() => (None, Some(error.to_string())),
+            Some(Err(error)) => return Err(error),
+        };
+        Ok(FrameScore {
+            protocol: self.key(),
+            pixels: sums.pixels as u64,
+            channel_mse: sums.channel_mse(),
+            mse: sums.mse(),
+            psnr: self.psnr.psnr(sums.channel_mse()),
+            ssim: ssim.transpose()?,
+            lpips,
+            lpips_missing,
+        })
+    }
+
+    /// Steps 1 to 3: composite, clamp, quantise, cut out the region.
+    ///
+    /// # Errors
+    /// As [`Protocol::score`], but for the SSIM window.
+    pub fn prepare(&self, render: &Image, truth: Truth<'_>) -> Result<Prepared, MetricsError> {
+        let size = (render.width(), render.height());
+        let rgb = truth.rgb();
+        MetricsError::check_size("truth", (rgb.width(), rgb.height()), size)?;
+        if let Some(mask) = truth.mask() {
+            let field = if matches!(truth, Truth::Straight { .. }) { "alpha" } else { "mask" };
+            check_mask(mask, field, size)?;
+        }
+        let background = self.background_colour().unwrap_or_default().map(exact_level);
+        let alpha = match (truth, self.background) {
+            (Truth::Straight { alpha, .. }, Background::Colour(_)) => Some(alpha.values()),
+            _ => None,
+        };
+        let outside = self.outside(truth.mask(), background)?;
+        let width = render.width();
+        let finish = |y: usize, rgb: [&mut [f64]; 3]| {
+            for (c, values) in rgb.into_iter().enumerate() {
+                self.clamp.apply(values);
+                self.quantise.apply(values);
+                outside.apply(y * width, c, values);
+            }
+        };
+        let render = Planes::by_rows(render, "render", finish)?;
+        let rgb = Planes::by_rows(rgb, "truth", |y, mut rgb| {
+            if let Some(alpha) = alpha {
+                for (values, background) in rgb.iter_mut().zip(background) {
+                    composite(values, &alpha[y * width..], background);
+                }
+            }
+            finish(y, rgb);
+        })?;
+        self.cut(render, rgb, truth.mask())
+    }
+
+    /// How the region changes pixels.
+    fn outside<'a>(&self, mask: Option<&'a Mask>, background: [f64; 3]) -> Result<Outside<'a>, MetricsError> {
+        let region = self.region;
+        let mask = match mask {
+            Some(mask) => mask.values(),
+            None if region.needs_mask() => return Err(MetricsError::NoMask { region: region.id() }),
+            None => return Ok(Outside::Kept),
+        };
+        Ok(match region {
+            Region::Full | Region::MaskBoundingBox | Region::MaskBoundingBoxExclusive | Region::Mask => {
+                Outside::Kept
+            }
+            Region::ImageTimesMask => Outside::Scaled { mask },
+            Region::BackgroundOutsideMask => {
+                Outside::Filled { mask, threshold: self.mask_threshold, colour: background }
+            }
+        })
+    }
+
+    /// Crops to the region, or adds its weights.
+    fn cut(&self, render: Planes, truth: Planes, mask: Option<&Mask>) -> Result<Prepared, MetricsError> {
+        let (region, threshold) = (self.region, self.mask_threshold);
+        let crop = |mask: &Mask, exclusive: bool| {
+            let empty = MetricsError::EmptyRegion { region: region.id(), threshold };
+            let rect = bounding_box(mask, threshold, exclusive).ok_or(empty)?;
+            Ok(Prepared { render: render.crop(&rect), truth: truth.crop(&rect), weights: None })
+        };
+        match (region, mask) {
+            (Region::MaskBoundingBox, Some(mask)) => crop(mask, false),
+            (Region::MaskBoundingBoxExclusive, Some(mask)) => crop(mask, true),
+            (Region::Mask, Some(mask)) => {
+                let weights = Some(inside(mask, threshold, region)?);
+                Ok(Prepared { render, truth, weights })
+            }
+            _ => Ok(Prepared { render, truth, weights: None }),
+        }
+    }
+}
+
+/// What happens to pixels outside the mask.
+enum Outside<'a> {
+    /// Nothing.
+    Kept,
+    /// Every pixel is multiplied by its mask value.
+    Scaled { mask: &'a [f32] },
+    /// Pixels below the threshold take a colour.
+    Filled { mask: &'a [f32], threshold: f32, colour: [f64; 3] },
+}
+
+impl Outside<'_> {
+    /// Changes values of channel `channel`, the first of which belongs to pixel `start`.
+    #[inline(always)]
+    fn apply(&self, start: usize, channel: usize, values: &mut [f64]) {
+        match *self {
+            Self::Kept => (),
+            Self::Scaled { mask } => {
+                for (value, &mask) in values.iter_mut().zip(&mask[start..]) {
+                    *value *= exact_level(mask);
+                }
+            }
+            Self::Filled { mask, threshold, colour } => {
+                for (value, &mask) in values.iter_mut().zip(&mask[start..]) {
+                    *value = if mask >= threshold { *value } else { colour[channel] };
+                }
+            }
+        }
+    }
+}
+
+/// `v a + background (1 - a)`.
+#[inline(always)]
+fn composite(values: &mut [f64], alpha: &[f32], background: f64) {
+    for (value, &alpha) in values.iter_mut().zip(alpha) {
+        let alpha = exact_level(alpha);
+        *value = *value * alpha + background * (1.0 - alpha);
+    }
+}
+
+/// +inf as `null`.
+pub(crate) mod infinite_as_null {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    pub(crate) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        if value.is_finite() { serializer.serialize_f64(*value) } else { serializer.serialize_none() }
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::LpipsVariant;
+
+    const SIZE: usize = 24;
+
+    /// A gradient plus a constant per channel.
+    fn gradient(offset: [f32; 3]) -> Image {
+        let pixel = |i: usize| offset.map(|o| o + 0.2 * (i % SIZE) as f32 / SIZE as f32);
+        Image::new(SIZE, SIZE, (0..SIZE * SIZE).map(pixel).collect()).unwrap()
+    }
+
+    fn left_half() -> Mask {
+        let value = |i: usize| f32::from(u8::from(i % SIZE < SIZE / 2));
+        Mask::new(SIZE, SIZE, (0..SIZE * SIZE).map(value).collect()).unwrap()
+    }
+
+    fn protocol(changes: &str) -> Protocol {
+        Protocol::parse(&format!("default+quantise=none{changes}")).unwrap()
+    }
+
+    #[test]
+    fn a_straight_truth_is_composited_over_the_background() {
+        let (truth, alpha) = (gradient([0.3; 3]), left_half());
+        let render = truth.composited(&alpha, [1.0; 3]).unwrap();
+        let straight = Truth::Straight { rgb: &truth, alpha: &alpha };
+        let score = protocol("").score(&render, straight).unwrap();
+        assert!(score.mse < 1e-15 && (score.ssim.unwrap() - 1.0).abs() < 1e-9, "{score:?}");
+        let captured = protocol("+background=captured").score(&render, straight).unwrap();
+        assert!(captured.mse > 0.1);
+        assert_eq!(protocol("+background=captured").score(&truth, straight).unwrap().psnr, f64::INFINITY);
+    }
+
+    #[test]
+    fn regions_choose_pixels() {
+        let (render, truth) = (gradient([0.4, 0.3, 0.3]), gradient([0.3; 3]));
+        // The render is off by 0.1 in red everywhere, and by 0.3 in blue where the mask is 0.
+        let mask = left_half();
+        let mut render = render;
+        for (pixel, &inside) in render.pixels_mut().iter_mut().zip(mask.values()) {
+            pixel[2] += 0.3 * (1.0 - inside);
+        }
+        let score = |region: &str| {
+            let truth = Truth::Composited { rgb: &truth, mask: Some(&mask) };
+            protocol(&format!("+region={region}")).score(&render, truth).unwrap()
+        };
+        let close = |score: FrameScore, pixels: u64, mse: [f64; 3]| {
+            assert_eq!(score.pixels, pixels);
+            for c in 0..3 {
+                assert!((score.channel_mse[c] - mse[c]).abs() < 1e-7, "{score:?}");
+            }
+        };
+        close(score("full"), 576, [0.01, 0.0, 0.045]);
+        close(score("mask"), 288, [0.01, 0.0, 0.0]);
+        close(score("mask-bounding-box"), 288, [0.01, 0.0, 0.0]);
+        close(score("mask-bounding-box-exclusive"), 23 * 11, [0.01, 0.0, 0.0]);
+        close(score("image-times-mask"), 576, [0.005, 0.0, 0.0]);
+        close(score("background-outside-mask"), 576, [0.005, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn bad_input_is_named() {
+        let (image, mask) = (gradient([0.3; 3]), left_half());
+        let small = Image::filled(SIZE, 10, [0.5; 3]);
+        let truth = Truth::Composited { rgb: &image, mask: None };
+        let message = |result: Result<FrameScore, MetricsError>| result.unwrap_err().to_string();
+        let plain = protocol("");
+        assert_eq!(
+            message(plain.score(&small, truth)),
+            "truth: 24x24 pixels; expected 24x10, the size of the render"
+        );
+        let wide = Mask::filled(SIZE + 1, SIZE, 1.0);
+        let wrong_alpha = Truth::Straight { rgb: &image, alpha: &wide };
+        assert_eq!(
+            message(plain.score(&image, wrong_alpha)),
+            "alpha: 25x24 pixels; expected 24x24, the size of the render"
+        );
+        let small_truth = Truth::Composited { rgb: &small, mask: None };
+        assert_eq!(
+            message(plain.score(&small, small_truth)),
+            "ssim_valid: the scored image has 24x10 pixels; expected at least 11x11"
+        );
+        let mut broken = image.clone();
+        broken.pixels_mut()[SIZE + 2][1] = f32::NAN;
+        assert_eq!(
+            message(plain.score(&broken, truth)),
+            "render: NaN in channel 1 at x 2, y 1; expected a finite value"
+        );
+        let masked = protocol("+region=mask");
+        assert_eq!(
+            message(masked.score(&image, truth)),
+            "mask: none given; expected one, for region \"mask\""
+        );
+        let empty = Mask::filled(SIZE, SIZE, 0.25);
+        for region in ["mask", "mask-bounding-box"] {
+            let truth = Truth::Composited { rgb: &image, mask: Some(&empty) };
+            let error = protocol(&format!("+region={region}")).score(&image, truth).unwrap_err();
+            assert!(matches!(error, MetricsError::EmptyRegion { .. }), "{error}");
+        }
+        let mut corner = Mask::filled(SIZE, SIZE, 0.0);
+        corner.values_mut()[0] = 1.0;
+        let truth = Truth::Composited { rgb: &image, mask: Some(&corner) };
+        let error = masked.score(&image, truth).unwrap_err();
+        assert!(matches!(error, MetricsError::NoCoveredPixel { .. }), "{error}");
+        let mut holed = mask;
+        holed.values_mut()[5] = f32::INFINITY;
+        let truth = Truth::Straight { rgb: &image, alpha: &holed };
+        assert_eq!(
+            message(plain.score(&image, truth)),
+            "alpha: inf in channel 0 at x 5, y 0; expected a finite value"
+        );
+    }
+
+    #[test]
+    fn records_keep_infinity_and_absence() {
+        let image = gradient([0.3; 3]);
+        let score = protocol("").score(&image, Truth::Composited { rgb: &image, mask: None }).unwrap();
+        let text = serde_json::to_string(&score).unwrap();
+        assert!(text.contains("\"psnr\":null") && text.contains("\"lpips\":null"), "{text}");
+        let read: FrameScore = serde_json::from_str(&text).unwrap();
+        assert_eq!((read.psnr, &read), (f64::INFINITY, &score));
+        let without = text.replace("\"psnr\":null,", "");
+        assert!(serde_json::from_str::<FrameScore>(&without).is_err(), "a missing PSNR is not +inf");
+    }
+
+    struct MeanDifference;
+
+    impl PerceptualDistance for MeanDifference {
+        fn distance(
+            &self,
+            render: &Planes,
+            truth: &Planes,
+            variant: LpipsVariant,
+        ) -> Result<f64, MetricsError> {
+            assert_eq!(variant.id(), "alex-pm1");
+            Ok(ErrorSums::new(render, truth, None)?.mae())
+        }
+    }
+
+    #[test]
+    fn a_scorer_fills_lpips_with_the_prepared_images() {
+        let (render, truth, mask) = (gradient([0.4; 3]), gradient([0.3; 3]), left_half());
+        let truth = Truth::Composited { rgb: &truth, mask: Some(&mask) };
+        let wanted = Wanted { ssim: false, lpips: Some(&MeanDifference) };
+        let lpips = |changes: &str| {
+            let score = protocol(changes).score_with(&render, truth, wanted).unwrap();
+            assert_eq!(score.ssim, None);
+            score.lpips
+        };
+        assert!((lpips("").unwrap() - 0.1).abs() < 1e-7);
+        assert!((lpips("+region=image-times-mask").unwrap() - 0.05).abs() < 1e-7);
+        assert_eq!(lpips("+region=mask"), None);
+        assert_eq!(protocol("").score(&render, truth).unwrap().lpips, None);
+    }
+}

@@ -1,0 +1,357 @@
+//! Posing walked backwards: from derivatives with respect to [`Posed`] to those with respect to the stored parameters of
+//! the avatar, a chunk of Gaussians at a time.
+//!
+//! [`Posed`]: skinsplat_core::scene::Posed
+
+use super::bound::{Moves, expect_count};
+use super::covariance;
+use super::frame::{Frame, Visitor};
+use super::layout::{Block, CHUNK, LANES, Lanes};
+use super::rotate::{self, BlockInput, Turn, put, take};
+use super::surfel::Disc;
+use super::{BoundAvatar, ColourChoice, CovarianceChoice, Strategy, StrategyError, colour};
+use glam::Vec3;
+use rayon::prelude::*;
+use skinsplat_core::math::{Quaternion, dot4, rotation};
+use skinsplat_core::scene::{AvatarGradient, Gaussians, PosedBody, PosedGradient, SceneError};
+
+/// Adds to `gradient` what a pose contributes, so that the frames of a batch sum in the order of the calls: the transposed
+/// derivative of [`pose`](super::pose()) applied to `upstream`. `gaussians` are those that `bound` was made of or last
+/// updated with; `gradient` is one that [`AvatarGradient::reset`] made for them.
+///
+/// Exact for every strategy, piecewise where a strategy chooses (the branch of a matrix-to-quaternion conversion, the
+/// thin axis of a disc). Two dependencies are left out, as the stock methods leave them out or because [`PosedGradient`]
+/// has no place for them:
+/// * barycentric coordinates move the position only, neither the skinning weights mixed with them nor a vertex average;
+/// * frames in which view directions are read do not follow parameters (only those of a conversion of B R_c could).
+///
+/// The result is the same, bit for bit, for any number of threads and any width of vector instructions.
+///
+/// # Errors
+/// Those of [`pose`](super::pose()), and [`StrategyError::Scene`] for arrays whose length does not fit the bound avatar.
+/// Nothing was added then.
+pub fn pose_backward(
+    bound: &BoundAvatar,
+    body: &PosedBody<'_>,
+    strategy: &Strategy,
+    gaussians: &Gaussians,
+    upstream: &PosedGradient,
+    gradient: &mut AvatarGradient,
+) -> Result<(), StrategyError> {
+    backward_on(pulp::Arch::new(), bound, body, strategy, gaussians, upstream, gradient)
+}
+
+/// [`pose_backward`] with the instructions of one kind of processor.
+pub(super) fn backward_on(
+    arch: pulp::Arch,
+    bound: &BoundAvatar,
+    body: &PosedBody<'_>,
+    strategy: &Strategy,
+    gaussians: &Gaussians,
+    upstream: &PosedGradient,
+    gradient: &mut AvatarGradient,
+) -> Result<(), StrategyError> {
+    let frame = Frame::new(arch, bound, body, strategy, None)?;
+    check(bound, gaussians, upstream, gradient)?;
+    let parts = Part::split(gradient, bound.sh_count());
+    parts.into_par_iter().enumerate().for_each(|(number, gradient)| {
+        let start = number * CHUNK;
+        AdjointChunk { frame: &frame, gaussians, upstream, number, start, gradient, turns: Vec::new() }.run();
+    });
+    Ok(())
+}
+
+fn check(
+    bound: &BoundAvatar,
+    gaussians: &Gaussians,
+    upstream: &PosedGradient,
+    gradient: &AvatarGradient,
+) -> Result<(), SceneError> {
+    bound.check_counts(gaussians)?;
+    let (n, coefficients) = (bound.len(), bound.sh.len());
+    expect_count("f_dc/f_rest", gaussians.sh.len(), coefficients)?;
+    expect_count("gradient of the posed means", upstream.means.len(), n)?;
+    expect_count("gradient of the factors", upstream.factors.len(), n)?;
+    expect_count("gradient of the opacities", upstream.opacities.len(), n)?;
+    expect_count("gradient of the posed SH", upstream.sh.len(), coefficients)?;
+    expect_count("gradient of x, y, z", gradient.means.len(), n)?;
+    expect_count("gradient of rot", gradient.rotations.len(), n)?;
+    expect_count("gradient of scale", gradient.log_scales.len(), n)?;
+    expect_count("gradient of opacity", gradient.opacity_logits.len(), n)?;
+    expect_count("gradient of f_dc/f_rest", gradient.sh.len(), coefficients)?;
+    let seated = if bound.moves == Moves::WithFaces { n } else { 0 };
+    expect_count("gradient of barycentric", gradient.barycentric.len(), seated)?;
+    expect_count("gradient of offset", gradient.offsets.len(), seated)
+}
+
+/// One chunk's part of an [`AvatarGradient`].
+struct Part<'o> {
+    means: &'o mut [Vec3],
+    rotations: &'o mut [Quaternion<f32>],
+    log_scales: &'o mut [Vec3],
+    opacity_logits: &'o mut [f32],
+    sh: &'o mut [[f32; 3]],
+    /// Empty unless face-bound, as `offsets`.
+    barycentric: &'o mut [[f32; 3]],
+    offsets: &'o mut [f32],
+}
+
+impl<'o> Part<'o> {
+    /// The parts of consecutive chunks.
+    fn split(gradient: &'o mut AvatarGradient, sh_count: usize) -> Vec<Self> {
+        let mut rotations = gradient.rotations.chunks_mut(CHUNK);
+        let mut log_scales = gradient.log_scales.chunks_mut(CHUNK);
+        let mut opacity_logits = gradient.opacity_logits.chunks_mut(CHUNK);
+        let mut sh = gradient.sh.chunks_mut(CHUNK * sh_count);
+        let mut barycentric = gradient.barycentric.chunks_mut(CHUNK);
+        let mut offsets = gradient.offsets.chunks_mut(CHUNK);
+        let means = gradient.means.chunks_mut(CHUNK);
+        means
+            .map(|means| Self {
+                means,
+                rotations: rotations.next().unwrap_or_default(),
+                log_scales: log_scales.next().unwrap_or_default(),
+                opacity_logits: opacity_logits.next().unwrap_or_default(),
+                sh: sh.next().unwrap_or_default(),
+                barycentric: barycentric.next().unwrap_or_default(),
+                offsets: offsets.next().unwrap_or_default(),
+            })
+            .collect()
+    }
+}
+
+/// The work on one chunk.
+struct AdjointChunk<'f, 'a, 'o> {
+    frame: &'f Frame<'a>,
+    gaussians: &'f Gaussians,
+    upstream: &'f PosedGradient,
+    /// Position of the chunk.
+    number: usize,
+    /// Index of its first Gaussian.
+    start: usize,
+    gradient: Part<'o>,
+    /// R of each Gaussian, for the SH; empty if they stay.
+    turns: Vec<Quaternion<f32>>,
+}
+
+impl AdjointChunk<'_, '_, '_> {
+    /// As forwards: blocks by joints, then what streams through memory.
+    fn run(mut self) {
+        let frame = self.frame;
+        if self.rotates_sh() {
+            self.turns.resize(self.gradient.means.len(), [0.0; 4]);
+        }
+        let chunk = &frame.bound.chunks(frame.strategy.covariance)[self.number];
+        frame.walk(chunk, self.start, &mut self);
+        self.seats();
+        self.opacities();
+        self.sh();
+    }
+
+    fn rotates_sh(&self) -> bool {
+        self.frame.strategy.colour == ColourChoice::RotateSh && self.frame.bound.sh_degree > 0
+    }
+
+    /// Barycentric coordinates and offsets, through the point on the posed mesh, or on the rest mesh where the face
+    /// carries that along.
+    fn seats(&mut self) {
+        let Frame { bound, body, .. } = self.frame;
+        let (Moves::WithFaces, Some(surface)) = (bound.moves, &bound.surface) else { return };
+        let mesh = body.mesh();
+        let places = self.gradient.barycentric.iter_mut().zip(self.gradient.offsets.iter_mut());
+        for (i, (barycentric, offset)) in places.enumerate() {
+            let gaussian = self.start + i;
+            let (seat, of_mean) = (&surface.seats[gaussian], self.upstream.means[gaussian]);
+            let (of_barycentric, of_offset) = match self.frame.face_motion(gaussian) {
+                Some(motion) => seat.point_adjoint(&surface.faces.mesh, motion.adjoint(of_mean)),
+                None => seat.point_adjoint(mesh, of_mean),
+            };
+            barycentric.iter_mut().zip(of_barycentric).for_each(|(sum, own)| *sum += own);
+            *offset += of_offset;
+        }
+    }
+
+    /// The sigmoid: o (1 − o).
+    fn opacities(&mut self) {
+        let range = self.start..self.start + self.gradient.opacity_logits.len();
+        let opacities = self.frame.bound.opacities[range.clone()].iter().zip(&self.upstream.opacities[range]);
+        for (sum, (&opacity, &own)) in self.gradient.opacity_logits.iter_mut().zip(opacities) {
+            *sum += own * (opacity * (1.0 - opacity));
+        }
+    }
+
+    fn sh(&mut self) {
+        let (degree, count) = (self.frame.bound.sh_degree, self.frame.bound.sh_count());
+        let upstream = &self.upstream.sh[self.start * count..][..self.gradient.sh.len()];
+        if self.turns.is_empty() {
+            return colour::add_sh(upstream, self.gradient.sh);
+        }
+        let values = upstream.chunks_exact(count).zip(self.gradient.sh.chunks_exact_mut(count));
+        for (turn, (upstream, gradient)) in self.turns.iter().zip(values) {
+            colour::rotate_sh_adjoint(*turn, degree, upstream, gradient);
+        }
+    }
+
+    /// The derivatives with respect to the factors of a block, row-major.
+    #[inline(always)]
+    fn of_factors(&self, block: &Block) -> [Lanes; 9] {
+        let mut gathered = [[0.0; LANES]; 9];
+        for lane in 0..LANES {
+            let columns = self.upstream.factors[self.start + usize::from(block.index[lane])].to_cols_array();
+            for row in 0..3 {
+                for column in 0..3 {
+                    gathered[3 * row + column][lane] = columns[3 * column + row];
+                }
+            }
+        }
+        gathered
+    }
+
+    /// The derivatives with respect to canonical means.
+    #[inline(always)]
+    fn of_means(&self, input: &BlockInput<'_>, turn: &Turn) -> [Lanes; 3] {
+        let mut gathered = [[0.0; LANES]; 3];
+        if self.frame.bound.moves == Moves::WithFaces {
+            return gathered;
+        }
+        for lane in 0..LANES {
+            let own = self.upstream.means[input.gaussian(lane)];
+            for axis in 0..3 {
+                gathered[axis][lane] = own[axis];
+            }
+        }
+        match (self.frame.bound.moves, &turn.means) {
+            (Moves::Not | Moves::WithFaces, _) => gathered,
+            (Moves::ByWeights, Some(_)) => rotate::means_adjoint(turn, &gathered),
+            (Moves::ByWeights, None) => {
+                let mut means = input.blend.transform_adjoint(&gathered);
+                if self.frame.scales_with_faces() {
+                    self.of_carried_means(input, &mut means);
+                }
+                means
+            }
+        }
+    }
+
+    /// Those that a face carries along.
+    #[inline(never)]
+    fn of_carried_means(&self, input: &BlockInput<'_>, means: &mut [Lanes; 3]) {
+        for lane in 0..LANES {
+            let gaussian = input.gaussian(lane);
+            if let Some(motion) = self.frame.face_motion(gaussian) {
+                let own = motion.adjoint(self.upstream.means[gaussian]);
+                (0..3).for_each(|axis| means[axis][lane] = own[axis]);
+            }
+        }
+    }
+
+    /// The derivatives with respect to canonical unit quaternions, from those of the covariance: with respect to the
+    /// posed ones where it is rotated, to the canonical ones where it is deformed.
+    #[inline(always)]
+    fn of_rotations(&self, input: &BlockInput<'_>, turn: &Turn, of_covariance: &[Lanes; 4]) -> [Lanes; 4] {
+        let source = &self.frame.source;
+        let torque = (self.frame.converts() && self.rotates_sh()).then(|| self.torque(input, turn));
+        match (self.frame.strategy.covariance, torque) {
+            (CovarianceChoice::Rotate | CovarianceChoice::Surfel, torque) => {
+                rotate::turn_adjoint(source, input, turn, of_covariance, torque.as_ref())
+            }
+            (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, None) => *of_covariance,
+            (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, torque) => {
+                let none = [[0.0; LANES]; 4];
+                let of_colour = rotate::turn_adjoint(source, input, turn, &none, torque.as_ref());
+                rotate::sum(of_covariance, &of_colour)
+            }
+        }
+    }
+
+    /// How the loss changes if R turns on, where R depends on R_c and SH turn with R.
+    #[inline(never)]
+    fn torque(&self, input: &BlockInput<'_>, turn: &Turn) -> [Lanes; 3] {
+        let mut torque = [[0.0; LANES]; 3];
+        let (degree, count) = (self.frame.bound.sh_degree, self.frame.bound.sh_count());
+        for lane in 0..LANES {
+            let range = input.gaussian(lane) * count..(input.gaussian(lane) + 1) * count;
+            let (own, upstream) = (&self.frame.bound.sh[range.clone()], &self.upstream.sh[range]);
+            let of_lane = colour::sh_torque(take(&turn.relative, lane), degree, own, upstream);
+            (0..3).for_each(|axis| torque[axis][lane] = of_lane[axis]);
+        }
+        torque
+    }
+
+    /// From the discs of a block to its Gaussians.
+    #[inline(never)]
+    fn through_discs(
+        &self,
+        position: usize,
+        input: &BlockInput<'_>,
+        rotations: &mut [Lanes; 4],
+        log_scales: &mut [Lanes; 3],
+    ) {
+        let bound = self.frame.bound;
+        let Some(surface) = &bound.surface else { return };
+        let own = &bound.chunks(CovarianceChoice::Rotate)[self.number].blocks[position];
+        for lane in 0..LANES {
+            let canonical = take(&own.rotations, lane);
+            let Some(disc) = Disc::nearest(canonical, surface, input.gaussian(lane)) else { continue };
+            let of_scales = [0, 1, 2].map(|axis: usize| log_scales[axis][lane]);
+            let (snapped, of_snapped) = (take(&input.block.rotations, lane), take(rotations, lane));
+            let (of_rotation, of_scales) = disc.adjoint(canonical, snapped, of_snapped, of_scales);
+            put(rotations, lane, of_rotation);
+            (0..3).for_each(|axis| log_scales[axis][lane] = of_scales[axis]);
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, block: &Block, means: &[Lanes; 3], rotations: &[Lanes; 4], log_scales: &[Lanes; 3]) {
+        for lane in 0..block.count {
+            let i = usize::from(block.index[lane]);
+            self.gradient.means[i] += Vec3::new(means[0][lane], means[1][lane], means[2][lane]);
+            let own = take(rotations, lane);
+            self.gradient.rotations[i].iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+            self.gradient.log_scales[i] +=
+                Vec3::new(log_scales[0][lane], log_scales[1][lane], log_scales[2][lane]);
+        }
+    }
+
+    /// From unit quaternions to stored ones.
+    #[inline(always)]
+    fn of_stored(&self, input: &BlockInput<'_>, units: &[Lanes; 4], of_units: &[Lanes; 4]) -> [Lanes; 4] {
+        let mut stored = [[0.0; LANES]; 4];
+        for lane in 0..LANES {
+            put(&mut stored, lane, self.gaussians.rotations[input.gaussian(lane)]);
+        }
+        for lane in 0..LANES {
+            let unit = take(units, lane);
+            // |q| = unit · q.
+            let inverse = 1.0 / dot4(unit, take(&stored, lane));
+            put(&mut stored, lane, rotation::adjoint::normalize(unit, inverse, take(of_units, lane)));
+        }
+        stored
+    }
+}
+
+impl Visitor for AdjointChunk<'_, '_, '_> {
+    #[inline(always)]
+    fn block(&mut self, position: usize, input: &BlockInput<'_>, turn: &Turn, scales: &[Lanes; 3]) {
+        let (block, choice) = (input.block, self.frame.strategy.covariance);
+        let of_factors = self.of_factors(block);
+        let of_covariance =
+            covariance::adjoint(choice, &turn.posed, input.blend, &block.rotations, scales, &of_factors);
+        let mut log_scales = of_covariance.log_scales;
+        let mut rotations = self.of_rotations(input, turn, &of_covariance.rotation);
+        let mut units = &block.rotations;
+        if choice == CovarianceChoice::Surfel {
+            self.through_discs(position, input, &mut rotations, &mut log_scales);
+            let own = &self.frame.bound.chunks(CovarianceChoice::Rotate)[self.number];
+            units = &own.blocks[position].rotations;
+        }
+        let stored = self.of_stored(input, units, &rotations);
+        let means = self.of_means(input, turn);
+        self.add(block, &means, &stored, &log_scales);
+        if !self.turns.is_empty() {
+            for lane in 0..block.count {
+                self.turns[usize::from(block.index[lane])] = take(&turn.relative, lane);
+            }
+        }
+    }
+}

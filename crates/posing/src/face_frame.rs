@@ -1,0 +1,71 @@
+//! Orthonormal frames on triangles, as three stock methods build them, and the rotation of a face between two poses.
+//!
+//! Cost: a cross product and two square roots per face and pose. A face without area (its normal shorter than 1e-5 of
+//! the product of its edges, or an edge of zero length) has no frame; callers then fall back on the quaternion average
+//! of the skinning weights. An inverted face has a proper frame like any other.
+
+use super::FaceFrame;
+use glam::Vec3;
+use skinsplat_core::math::{matrix3, rotation};
+
+/// A rotation matrix, row-major; its columns are the axes of the frame.
+pub type Frame = [[f32; 3]; 3];
+
+/// A face is degenerate if |e × f| is at most this times |e| |f|.
+const DEGENERATE_SINE: f32 = 1e-5;
+
+/// HAHA divides the size of a triangle by this length, metres.
+const HAHA_UNIT: f32 = 0.05;
+
+/// The frame of a triangle. `None` without area.
+///
+/// With n the outward normal (v1 − v0) × (v2 − v0) / |…|:
+/// ```text
+/// SplattingAvatar   d = unit(v1 − v0)     [d × n | −n | d]       utils/map.py
+/// iHuman            r = unit(v0 − v1)     [n | r | n × r]        deformer/mm_triangle_model.py, angle 0
+/// HAHA              e = unit(v2 − v1)     [e | n | e × n]        runners/train_gaussians.py
+/// ```
+pub fn frame(kind: FaceFrame, [a, b, c]: [Vec3; 3]) -> Option<Frame> {
+    let (edge, side) = match kind {
+        FaceFrame::SplattingAvatar | FaceFrame::IHuman => (b - a, c - a),
+        FaceFrame::Haha | FaceFrame::HahaScaled => (c - b, a - b),
+    };
+    let cross = edge.cross(side);
+    let (length, area) = (edge.length(), cross.length());
+    if !(area > DEGENERATE_SINE * length * side.length() && area.is_finite()) {
+        return None;
+    }
+    let (tangent, normal) = (edge / length, cross / area);
+    if !(tangent.is_finite() && normal.is_finite()) {
+        return None;
+    }
+    let [x, y, z] = match kind {
+        FaceFrame::SplattingAvatar => [tangent.cross(normal), -normal, tangent],
+        FaceFrame::IHuman => [normal, -tangent, normal.cross(-tangent)],
+        FaceFrame::Haha | FaceFrame::HahaScaled => [tangent, normal, tangent.cross(normal)],
+    };
+    Some([[x.x, y.x, z.x], [x.y, y.y, z.y], [x.z, y.z, z.z]])
+}
+
+/// iHuman's frame with its free in-plane angle given as a direction (cos, sin): `[n | c r1 + s r2 | −s r1 + c r2]`.
+pub fn ihuman_turned(triangle: [Vec3; 3], [c, s]: [f32; 2]) -> Option<Frame> {
+    let frame = frame(FaceFrame::IHuman, triangle)?;
+    Some(frame.map(|[n, r1, r2]| [n, c * r1 + s * r2, c * r2 - s * r1]))
+}
+
+/// The rotation that takes the rest frame of a face to its posed one, F_posed F_restᵀ, as a unit quaternion, w ≥ 0.
+pub(crate) fn turn(posed: &Frame, rest: &Frame) -> [f32; 4] {
+    rotation::matrix_to_quaternion(matrix3::multiply(*posed, matrix3::transpose(*rest)))
+}
+
+/// HAHA's k: the mean of the side |v0 − v2| and the height over it, in units of 5 cm. Zero without area.
+pub fn haha_size([a, b, c]: &[Vec3; 3]) -> f32 {
+    let side = a.distance(*c);
+    let height = if side > 0.0 { (c - b).cross(a - b).length() / side } else { 0.0 };
+    0.5 * (height + side) / HAHA_UNIT
+}
+
+/// The mean of the corners.
+pub(crate) fn centroid([a, b, c]: &[Vec3; 3]) -> Vec3 {
+    (a + b + c) / 3.0
+}

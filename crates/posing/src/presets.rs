@@ -1,0 +1,130 @@
+//! The paper's four strategies, the stock methods that it compares with ("Original" in Tables 1-5), and one more.
+
+use super::{
+    ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
+};
+use skinsplat_core::math::average::Solver;
+use skinsplat_core::math::rotation::SignPolicy;
+
+/// A strategy with a name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preset {
+    /// Stable id, used in experiments and on the command line.
+    pub id: &'static str,
+    /// For headings.
+    pub title: &'static str,
+    /// What it does, in a sentence.
+    pub summary: &'static str,
+    /// The choices.
+    pub strategy: Strategy,
+}
+
+/// Every preset. The first four are the paper's, in its order.
+pub const PRESETS: &[Preset] = &[
+    Preset {
+        id: "lbs",
+        title: "LBS",
+        summary: "the blended matrix, orthonormalised by Gram-Schmidt over its columns; SH alone",
+        strategy: Strategy {
+            rotation: RotationChoice::Lbs(LbsProjection::GramSchmidtColumns),
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::None,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "face-tbn",
+        title: "Face TBN",
+        summary: "the tangent frame of the face under the Gaussian; SH alone",
+        strategy: Strategy {
+            rotation: RotationChoice::FaceFrame(FaceFrame::SplattingAvatar),
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::None,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "view-canonical",
+        title: "View-canonical",
+        summary: "the blended matrix on the covariance, its transpose on the view direction",
+        strategy: Strategy {
+            rotation: RotationChoice::Lbs(LbsProjection::Polar),
+            covariance: CovarianceChoice::Affine,
+            colour: ColourChoice::ViewBlend,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "quaternion-average",
+        title: "Quaternion average",
+        summary: "the paper's: weighted average of the joints' quaternions (Eq. 7), SH rotated with it (Eq. 9)",
+        strategy: Strategy {
+            rotation: RotationChoice::QuaternionAverage(Solver::ClosedForm),
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::RotateSh,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "dual-quaternion",
+        title: "Dual quaternion",
+        summary: "dual-quaternion blending of position and rotation, SH rotated with it",
+        strategy: Strategy {
+            rotation: RotationChoice::DualQuaternion,
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::RotateSh,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "hugs-original",
+        title: "HUGS (original)",
+        summary: "PyTorch3D's quaternion of B R_c, drawn without normalising it; SH alone",
+        strategy: Strategy {
+            rotation: RotationChoice::Lbs(LbsProjection::MatrixToQuaternionRaw),
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::None,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "ihuman-original",
+        title: "iHuman (original)",
+        summary: "a 1 mm disc in the frame [n | r1' | r2'] of its face, the in-plane angle fixed; SH alone",
+        strategy: Strategy {
+            rotation: RotationChoice::FaceFrame(FaceFrame::IHuman),
+            covariance: CovarianceChoice::Surfel,
+            colour: ColourChoice::None,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "splattingavatar-original",
+        title: "SplattingAvatar (original)",
+        summary: "face rotations summed at vertices and barycentrically (w >= 0); direction turned back by the sum",
+        strategy: Strategy {
+            rotation: RotationChoice::VertexQuaternions(SignPolicy::NonNegativeW),
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::ViewRotation,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "animatable-original",
+        title: "Animatable 3D Gaussians (original)",
+        summary: "B R_c^T S^2 R_c B^T, the view direction multiplied by B^T, colours clamped to [0, 1]",
+        strategy: Strategy {
+            rotation: RotationChoice::Lbs(LbsProjection::Polar),
+            covariance: CovarianceChoice::AffineConjugate,
+            colour: ColourChoice::ViewBlend,
+            clamp: ClampChoice::Unit,
+        },
+    },
+];
+
+impl Strategy {
+    /// The preset of that id.
+    pub fn preset(id: &str) -> Option<Self> {
+        PRESETS.iter().find(|preset| preset.id == id).map(|preset| preset.strategy)
+    }
+}

@@ -1,0 +1,5 @@
+//! Sweeps as data: [`trade`] measures what every choice costs and how far it is from the exact answer, [`stress`] where each
+//! breaks.
+
+pub mod stress;
+pub mod trade;

@@ -1,0 +1,255 @@
+//! `datasets.toml`: which datasets exist, where they lie, under which licence.
+
+mod load;
+
+use serde::{Deserialize, Serialize};
+use skinsplat_data::folder::{self, Options, Subject};
+use skinsplat_data::peoplesnapshot::{self, Split};
+use skinsplat_data::{Capture, Error, error};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Every dataset that experiments can name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Registry {
+    /// The datasets, in the order of the file.
+    pub datasets: Vec<Dataset>,
+    path: PathBuf,
+}
+
+/// One dataset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dataset {
+    /// What experiments call it.
+    pub id: String,
+    /// What tables call it.
+    pub title: String,
+    /// How it is stored.
+    pub layout: Layout,
+    /// How its subjects were captured.
+    pub capture: Capture,
+    /// Terms of use.
+    pub licence: String,
+    /// Who made it, and how.
+    pub provenance: String,
+    /// A subject, or a folder that holds the subjects. Absolute after loading.
+    #[serde(default)]
+    pub path: Option<PathBuf>,
+    /// Body model for layouts that do not bring one. Absolute after loading.
+    #[serde(default)]
+    pub model: Option<PathBuf>,
+    /// Whether its subjects may stand in for those of a dataset that is not here.
+    #[serde(default = "yes")]
+    pub stand_in: bool,
+    /// Ids of the subjects, which are their folders' names unless `folders` says otherwise; empty if `path` is the only
+    /// subject.
+    #[serde(default)]
+    pub subjects: Vec<String>,
+    /// Folder names of subjects that experiments call otherwise.
+    #[serde(default)]
+    pub folders: BTreeMap<String, String>,
+    /// Frames to train and test on, by subject, for layouts that do not say.
+    #[serde(default)]
+    pub splits: BTreeMap<String, Split>,
+    /// What the generator of a synthetic dataset is given.
+    #[serde(default)]
+    pub parameters: toml::Table,
+}
+
+/// The default of [`Dataset::stand_in`].
+fn yes() -> bool {
+    true
+}
+
+/// How a dataset is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Layout {
+    /// Sequences with `transforms.json`; see [`folder`].
+    Folder,
+    /// Generated in-process.
+    Synthetic,
+    /// PeopleSnapshot as prepared for InstantAvatar; see [`peoplesnapshot`].
+    PeopleSnapshot,
+    /// NeuMan, as its authors publish it.
+    Neuman,
+    /// GalaBasketball, as its authors publish it.
+    GalaBasketball,
+    /// X-Humans, as its authors publish it.
+    XHumans,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    dataset: Vec<Dataset>,
+}
+
+const EMBEDDED: &str = include_str!("../../datasets.toml");
+
+impl Registry {
+    /// The registry that the program was built with. Its paths lead into the source tree of the build.
+    pub fn embedded() -> Self {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        Self::parse(EMBEDDED, &root.join("datasets.toml")).expect("a test parses the embedded registry")
+    }
+
+    /// Loads a `datasets.toml`; paths in it are relative to its folder.
+    ///
+    /// # Errors
+    /// An unreadable file, unknown or missing keys, two datasets of one id, a path that leaves out its subjects.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        Self::parse(&error::read_text(path, "registry", "a datasets.toml")?, path)
+    }
+
+    /// Makes a registry of a folder: a subject, a folder of subjects, or a folder with `datasets/` in it.
+    ///
+    /// # Errors
+    /// If no subject is found, or one that is found cannot be inspected.
+    pub fn scan(root: &Path) -> Result<Self, Error> {
+        let inner = root.join("datasets");
+        let parent = if inner.is_dir() { inner } else { root.to_owned() };
+        let folders = if folder::is_subject(&parent) { vec![parent.clone()] } else { subfolders(&parent)? };
+        let subjects = folders.iter().filter(|folder| folder::is_subject(folder));
+        let datasets = subjects.map(|folder| found(folder)).collect::<Result<Vec<_>, _>>()?;
+        if datasets.is_empty() {
+            let expected = "subjects: folders with sequences train* and test*, each with transforms.json";
+            return Err(Error::invalid(root, "datasets", "none", expected));
+        }
+        Ok(Self { datasets, path: root.to_owned() })
+    }
+
+    /// A dataset by id.
+    ///
+    /// # Errors
+    /// If there is none; the message lists the known ids.
+    pub fn get(&self, id: &str) -> Result<&Dataset, Error> {
+        self.datasets.iter().find(|d| d.id == id).ok_or_else(|| {
+            let ids: Vec<&str> = self.datasets.iter().map(|d| d.id.as_str()).collect();
+            Error::invalid(
+                &self.path,
+                "dataset",
+                format!("no id {id:?}"),
+                format!("one of: {}", ids.join(", ")),
+            )
+        })
+    }
+
+    fn parse(text: &str, path: &Path) -> Result<Self, Error> {
+        let malformed = |e: toml::de::Error| {
+            let line = e.span().map_or(0, |span| line_of(text, span.start));
+            Error::invalid(
+                path,
+                format!("line {line}"),
+                e.message().replace('\n', " "),
+                "a [[dataset]] table",
+            )
+        };
+        let File { dataset: mut datasets } = toml::from_str(text).map_err(malformed)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut ids = BTreeSet::new();
+        for (i, dataset) in datasets.iter_mut().enumerate() {
+            if !ids.insert(dataset.id.clone()) {
+                let field = format!("dataset[{i}].id");
+                return Err(Error::invalid(
+                    path,
+                    field,
+                    format!("{:?} again", dataset.id),
+                    "an id of its own",
+                ));
+            }
+            let names = dataset.subjects.iter().chain(dataset.folders.values());
+            let within = names.into_iter().all(|s| Path::new(s).components().count() == 1);
+            if !within {
+                let expected = "names of folders inside path";
+                return Err(Error::invalid(path, format!("dataset[{i}].subjects"), "a path", expected));
+            }
+            for place in [&mut dataset.path, &mut dataset.model].into_iter().flatten() {
+                *place = folder.join(&*place);
+            }
+        }
+        Ok(Self { datasets, path: path.to_owned() })
+    }
+}
+
+impl Dataset {
+    /// True if the data is there: always for synthetic datasets, else if the folder of every subject exists.
+    pub fn is_available(&self) -> bool {
+        self.layout == Layout::Synthetic
+            || self.subject_folders().is_some_and(|folders| folders.iter().all(|folder| folder.is_dir()))
+    }
+
+    /// The subjects' folders; `None` without a path.
+    pub fn subject_folders(&self) -> Option<Vec<PathBuf>> {
+        let path = self.path.as_ref()?;
+        Some(match self.subjects.is_empty() {
+            true => vec![path.clone()],
+            false => {
+                let folder = |subject| path.join(self.folders.get(subject).unwrap_or(subject));
+                self.subjects.iter().map(folder).collect()
+            }
+        })
+    }
+
+    /// Loads a subject from one of [`Dataset::subject_folders`]; no image is decoded.
+    ///
+    /// # Errors
+    /// As [`Subject::load`]; a layout that is not read from files.
+    pub fn load_subject(&self, folder: &Path, options: &Options) -> Result<Subject, Error> {
+        let mut options = options.clone();
+        options.model = options.model.or_else(|| self.model.clone());
+        match self.layout {
+            Layout::Folder => Subject::load(folder, &options),
+            Layout::PeopleSnapshot => {
+                let name = folder.file_name().unwrap_or_default().to_string_lossy();
+                let split = self.splits.get(name.as_ref()).ok_or_else(|| {
+                    let expected = "splits.<subject> = { train = [first, last, step], test = ... }";
+                    Error::invalid(folder, format!("splits.{name}"), "missing", expected)
+                })?;
+                peoplesnapshot::load(folder, split, &options)
+            }
+            layout => {
+                let problem = format!("no reader for {layout:?}").to_lowercase();
+                Err(Error::invalid(
+                    folder,
+                    "layout",
+                    problem,
+                    "folder or peoplesnapshot (convert the data first)",
+                ))
+            }
+        }
+    }
+}
+
+fn line_of(text: &str, offset: usize) -> usize {
+    text.bytes().take(offset).filter(|&b| b == b'\n').count() + 1
+}
+
+fn found(folder: &Path) -> Result<Dataset, Error> {
+    let id = folder.file_name().map_or_else(|| "dataset".into(), |name| name.to_string_lossy().into_owned());
+    Ok(Dataset {
+        title: id.clone(),
+        id,
+        layout: Layout::Folder,
+        capture: folder::inspect(folder)?,
+        licence: "see the data".to_owned(),
+        provenance: "found by scanning a folder".to_owned(),
+        path: Some(folder.to_owned()),
+        model: None,
+        stand_in: true,
+        subjects: Vec::new(),
+        folders: BTreeMap::new(),
+        splits: BTreeMap::new(),
+        parameters: toml::Table::new(),
+    })
+}
+
+fn subfolders(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let entries = std::fs::read_dir(folder)
+        .map_err(|cause| Error::read(folder, "datasets", "a folder of subjects", cause))?;
+    let mut folders: Vec<PathBuf> =
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_dir()).collect();
+    folders.sort();
+    Ok(folders)
+}
