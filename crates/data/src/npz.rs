@@ -2,17 +2,17 @@
 
 use super::Error;
 use super::npy::{self, Array, Header};
-use npyz::npz::NpzArchive;
 use skinsplat_core::scene::SceneError;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
+use zip::ZipArchive;
 
 /// An open archive.
 pub struct Archive {
     path: PathBuf,
-    inner: NpzArchive<BufReader<File>>,
+    inner: ZipArchive<BufReader<File>>,
     extents: BTreeMap<char, usize>,
 }
 
@@ -31,8 +31,9 @@ impl Archive {
     /// # Errors
     /// A file that cannot be read or is no zip archive.
     pub fn open(path: &Path, what: &str) -> Result<Self, Error> {
-        let inner = NpzArchive::open(path)
-            .map_err(|cause| Error::read(path, what, "a .npz archive of arrays", cause))?;
+        let open = || Ok::<_, zip::result::ZipError>(ZipArchive::new(BufReader::new(File::open(path)?))?);
+        let inner =
+            open().map_err(|cause| Error::read(path, what, "a .npz archive of arrays", cause.into()))?;
         Ok(Self { path: path.to_owned(), inner, extents: BTreeMap::new() })
     }
 
@@ -43,14 +44,15 @@ impl Archive {
 
     /// Names of all arrays, sorted.
     pub fn names(&self) -> Vec<String> {
-        let mut names: Vec<String> = self.inner.array_names().map(str::to_owned).collect();
+        let arrays = self.inner.file_names().filter_map(|name| name.strip_suffix(SUFFIX));
+        let mut names: Vec<String> = arrays.map(str::to_owned).collect();
         names.sort();
         names
     }
 
     /// True if the archive holds the array.
     pub fn contains(&self, name: &str) -> bool {
-        self.inner.array_names().any(|n| n == name)
+        self.inner.index_for_name(&file_name(name)).is_some()
     }
 
     /// Type and shape of an array, without its values.
@@ -144,15 +146,19 @@ impl Archive {
         name: &str,
         read: impl FnOnce(&mut dyn Read) -> Result<T, SceneError>,
     ) -> Result<Option<T>, Error> {
-        if !self.contains(name) {
-            return Ok(None);
-        }
-        let file_name = npyz::npz::file_name_from_array_name(name);
-        let mut entry = self.inner.zip_archive().by_name(&file_name).map_err(|cause| {
+        let Some(index) = self.inner.index_for_name(&file_name(name)) else { return Ok(None) };
+        let mut entry = self.inner.by_index(index).map_err(|cause| {
             Error::invalid(&self.path, name, format!("cannot read: {cause}"), "a stored or deflated array")
         })?;
         read(&mut entry).map(Some).map_err(|e| Error::scene(&self.path, e))
     }
+}
+
+/// What numpy appends to the name of an array.
+const SUFFIX: &str = ".npy";
+
+fn file_name(array: &str) -> String {
+    format!("{array}{SUFFIX}")
 }
 
 impl Array {
