@@ -40,16 +40,4 @@ pub enum StrategyError {
         /// What was expected.
         expected: String,
     },
-    /// A tolerance that nothing reaches.
-    #[error(
-        "tolerance {asked} degrees cannot be kept; the smallest that can is {reachable:.2e} degrees {place}"
-    )]
-    Tolerance {
-        /// What was asked for.
-        asked: f64,
-        /// The smallest tolerance that can be kept, degrees.
-        reachable: f64,
-        /// Of what: any pose, or this one.
-        place: &'static str,
-    },
 }

@@ -12,8 +12,7 @@ mod verdict;
 
 pub(super) use groups::{Group, groups};
 pub use pose::PoseBounds;
-pub(super) use theory::rounding;
-pub use verdict::{Pick, Verdict};
+pub use verdict::Verdict;
 
 use super::{BoundAvatar, RotationChoice};
 use rayon::prelude::*;
@@ -178,6 +177,23 @@ impl Needs {
             fewer_influences: (1..=groups::KEPT)
                 .map(|kept| over(&|frame| frame.fewer_influences(kept)))
                 .collect(),
+        })
+    }
+
+    /// The smallest tolerance that any pose can keep, degrees: what `f32` leaves of one bone.
+    pub fn smallest_tolerance() -> f64 {
+        theory::rounding::STORED.to_degrees()
+    }
+
+    /// A tolerance from text.
+    ///
+    /// # Errors
+    /// What was expected: a number that is not too small for any pose.
+    pub fn parse_tolerance(text: &str) -> Result<f64, String> {
+        let smallest = Self::smallest_tolerance();
+        let usable = |degrees: &f64| degrees.is_finite() && *degrees >= smallest;
+        text.parse().ok().filter(usable).ok_or_else(|| {
+            format!("a tolerance in degrees such as 0.5, finite and at least {smallest:.2e}")
         })
     }
 
