@@ -16,13 +16,13 @@ pub use verdict::Verdict;
 
 use super::{BoundAvatar, RotationChoice};
 use rayon::prelude::*;
-use serde::{Serialize, Serializer};
 use skinsplat_core::math::rotation;
 use skinsplat_core::scene::{Pose, PosedBody, RestBody, SceneError};
 use std::collections::BTreeMap;
 
 /// What an avatar and a motion need.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Needs {
     /// Gaussians.
     pub gaussians: usize,
@@ -55,7 +55,8 @@ pub struct Needs {
 }
 
 /// A value and the pose in which it was found.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Extreme {
     /// Degrees, or a gap in \[0, 1\].
     pub value: f64,
@@ -64,7 +65,8 @@ pub struct Extreme {
 }
 
 /// Two joints that share a Gaussian.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Pair {
     /// Indices, ascending.
     pub joints: [u16; 2],
@@ -75,7 +77,8 @@ pub struct Pair {
 }
 
 /// How far a rotation choice can be from the exact average.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Bound {
     /// The choice.
     pub rotation: RotationChoice,
@@ -89,8 +92,9 @@ pub struct Bound {
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Degrees(pub f64);
 
-impl Serialize for Degrees {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+#[cfg(feature = "serde")]
+impl serde::Serialize for Degrees {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         if self.0.is_finite() { serializer.serialize_f64(self.0) } else { serializer.serialize_none() }
     }
 }

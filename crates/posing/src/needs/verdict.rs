@@ -2,7 +2,6 @@
 
 use super::super::{LbsProjection, RotationChoice};
 use super::{Bound, Degrees, PoseBounds};
-use serde::Serialize;
 use skinsplat_core::math::average::{Solver, Start};
 use std::fmt;
 
@@ -18,7 +17,8 @@ const CANDIDATES: [RotationChoice; 2] = [
 const MOST_STEPS: u32 = 100;
 
 /// What is enough for a motion at a tolerance.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Verdict {
     /// Degrees.
     pub tolerance: f64,
