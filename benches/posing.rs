@@ -10,9 +10,9 @@ mod rig;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Mat3, Vec3};
 use skinsplat_core::scene::{AvatarGradient, Binding, Posed, PosedBody, PosedGradient};
-use skinsplat_posing::needs::Needs;
+use skinsplat_posing::needs::{Needs, PoseBounds};
 use skinsplat_posing::{
-    BoundAvatar, Choice, PRESETS, PoseBuffers, Strategy, Views, pose, pose_backward, pose_into,
+    BoundAvatar, PRESETS, PoseBuffers, Strategy, pose, pose_backward, pose_into,
 };
 use std::hint::black_box;
 
@@ -72,7 +72,7 @@ fn upstream(posed: &Posed<'_>) -> PosedGradient {
     gradient
 }
 
-/// What `auto` chooses from, and the other solvers: the static costs in `strategy::CANDIDATES`.
+/// The exact average, what is cheaper than it, and the other solvers: the costs that `needs` refers to.
 fn candidates(c: &mut Criterion) {
     let body = rig::body();
     let posed_body = PosedBody::new(&body, &rig::pose(&body)).unwrap();
@@ -93,10 +93,7 @@ fn candidates(c: &mut Criterion) {
         });
     }
     group.throughput(Throughput::Elements(1));
-    group.bench_function("bounds-of-a-pose", |b| {
-        let choice: Choice = "auto:0.5".parse().unwrap();
-        b.iter(|| black_box(choice.resolve(&bound, &posed_body, Views::Any)));
-    });
+    group.bench_function("bounds-of-a-pose", |b| b.iter(|| black_box(PoseBounds::new(&bound, &posed_body))));
 }
 
 fn updating(c: &mut Criterion) {

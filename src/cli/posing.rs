@@ -3,7 +3,7 @@
 use anyhow::{Context as _, Result, bail};
 use skinsplat_core::scene::{Avatar, Binding, Body, Camera, Pose, Posed, PosedBody, RestBody};
 use skinsplat_data::{body, ply, poses};
-use skinsplat_posing::{BoundAvatar, Choice, JointLift, PoseBuffers, Resolved, Strategy, Views};
+use skinsplat_posing::{BoundAvatar, JointLift, PoseBuffers, Strategy};
 use std::path::{Path, PathBuf};
 
 /// Which pose to take, and how to rotate the Gaussians.
@@ -22,10 +22,9 @@ pub(super) struct Posing {
     /// Pose of the track, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: usize,
-    /// Rotation strategy: a preset, a preset with changed axes (see `reproduce list strategies`), or auto:DEGREES, the
-    /// cheapest that is proved to be within so many degrees of the exact average in this pose
+    /// Rotation strategy: a preset, or a preset with changed axes (see `reproduce list strategies`)
     #[arg(long, value_name = "S", default_value = "quaternion-average")]
-    strategy: Choice,
+    strategy: Strategy,
 }
 
 /// An avatar that is ready to be posed.
@@ -38,7 +37,7 @@ pub(super) struct Subject {
 
 impl Posing {
     /// The strategy as it was asked for.
-    pub(super) fn strategy(&self) -> Choice {
+    pub(super) fn strategy(&self) -> Strategy {
         self.strategy
     }
 
@@ -95,28 +94,26 @@ impl Subject {
         &self.avatar
     }
 
-    /// Poses the avatar and hands the Gaussians to `use_posed`, with the strategy that posed them; without a body they stay
-    /// as they are. Where one camera looks at them, what it does not need is left out.
+    /// Poses the avatar and hands the Gaussians to `use_posed`; without a body they stay as they are. Where one camera looks
+    /// at them, what it does not need is left out.
     pub(super) fn posed<T>(
         &self,
-        choice: Choice,
+        strategy: &Strategy,
         camera: Option<&Camera>,
-        use_posed: impl FnOnce(&Posed, Option<&Resolved>) -> Result<T>,
+        use_posed: impl FnOnce(&Posed) -> Result<T>,
     ) -> Result<T> {
         let Some((rest, pose)) = &self.rest else {
-            return use_posed(&Posed::from_static(&self.avatar.gaussians), None);
+            return use_posed(&Posed::from_static(&self.avatar.gaussians));
         };
         let bound = BoundAvatar::new(&self.avatar, rest)?;
         let body = PosedBody::new(rest, pose)?;
         let Some(camera) = camera else {
-            let resolved = choice.resolve(&bound, &body, Views::Any)?;
-            return use_posed(&skinsplat_posing::pose(&bound, &body, &resolved.strategy)?, Some(&resolved));
+            return use_posed(&skinsplat_posing::pose(&bound, &body, strategy)?);
         };
         let bound = bound.without_zero_bands();
-        let resolved = choice.resolve(&bound, &body, Views::Few(1))?;
         let mut buffers = PoseBuffers::default();
-        let posed = skinsplat_posing::pose_seen(&bound, &body, &resolved.strategy, camera, &mut buffers)?;
-        use_posed(&posed, Some(&resolved))
+        let posed = skinsplat_posing::pose_seen(&bound, &body, strategy, camera, &mut buffers)?;
+        use_posed(&posed)
     }
 
     /// [`Subject::posed`] with the signs of joint quaternions followed through the track, from its first pose to this one.
@@ -143,11 +140,4 @@ impl Subject {
             &mut PoseBuffers::default(),
         )?)
     }
-}
-
-/// What `auto` picked, for a note; none for a strategy that was given.
-pub(super) fn picked(choice: Choice, resolved: Option<&Resolved>) -> Option<String> {
-    let Resolved { strategy, bound } = resolved?;
-    let degrees = skinsplat_posing::needs::Degrees((*bound)?);
-    Some(format!("{choice}: {strategy}, within {degrees} of the exact average"))
 }

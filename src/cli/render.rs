@@ -1,6 +1,6 @@
 //! `reproduce render`: an avatar, posed or as it stands, through a camera.
 
-use super::posing::{Posing, picked};
+use super::posing::Posing;
 use super::{Context, Exit, selection::parse_colour};
 use anyhow::{Result, bail};
 use skinsplat_data::{camera, frames};
@@ -49,16 +49,12 @@ impl Render {
         let background = self.background.or(view.background).unwrap_or([0.0; 3]);
         let settings = RenderSettings { background, antialiased: self.antialiased };
         let subject = self.posing.load(&self.file)?;
-        let choice = self.posing.strategy();
-        let (rendered, note) = subject.posed(choice, Some(&view.camera), |posed, resolved| {
-            Ok((splat::render(posed, &view.camera, &settings), picked(choice, resolved)))
+        let rendered = subject.posed(&self.posing.strategy(), Some(&view.camera), |posed| {
+            Ok(splat::render(posed, &view.camera, &settings))
         })?;
         match extension.as_str() {
             "png" => frames::save_png(&self.out, &rendered.image)?,
             _ => frames::save_npy(&self.out, &rendered.image)?,
-        }
-        if let Some(note) = note {
-            context.note(note);
         }
         let (n, out) = (subject.avatar().gaussians.len(), self.out.display());
         context.note(format!("{out}: {n} Gaussians, {}x{}", view.camera.width, view.camera.height));

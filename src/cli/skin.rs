@@ -1,11 +1,11 @@
 //! `reproduce skin`: a posed avatar as a plain 3DGS PLY.
 
-use super::posing::{Posing, picked};
+use super::posing::Posing;
 use super::{Context, Exit};
 use anyhow::{Result, bail};
 use skinsplat_core::scene::{Avatar, Binding};
 use skinsplat_data::ply;
-use skinsplat_posing::{Choice, Resolved, RotationChoice, Strategy, bake};
+use skinsplat_posing::{RotationChoice, Strategy, bake};
 use std::path::PathBuf;
 
 /// Pose an avatar and write a plain static 3DGS PLY.
@@ -41,23 +41,19 @@ impl Skin {
             bail!("--body is missing: an avatar is posed by a body");
         }
         let subject = self.posing.load(&self.avatar)?;
-        let choice = self.choice()?;
+        let strategy = self.strategy()?;
         let canonical = &subject.avatar().gaussians;
-        let (baked, resolved) = match (self.continuity, choice) {
-            (Some(Continuity::Previous), Choice::Fixed(strategy)) => {
-                let baked = subject.posed_following(&strategy, |posed| Ok(bake(posed, canonical)))?;
-                (baked, Some(Resolved { strategy, bound: None }))
+        let baked = match self.continuity {
+            Some(Continuity::Previous) => {
+                subject.posed_following(&strategy, |posed| Ok(bake(posed, canonical)))?
             }
-            _ => subject
-                .posed(choice, None, |posed, resolved| Ok((bake(posed, canonical), resolved.copied())))?,
+            Some(Continuity::Rest) | None => {
+                subject.posed(&strategy, None, |posed| Ok(bake(posed, canonical)))?
+            }
         };
-        let strategy = resolved.map(|resolved| resolved.strategy.to_string()).unwrap_or_default();
         let avatar = Avatar { gaussians: baked.gaussians, binding: Binding::Static };
         let metadata = ply::Metadata { body: None, comments: vec![format!("posed by {strategy}")] };
         ply::write_avatar(&self.out, &avatar, &metadata, ply::Encoding::LittleEndian)?;
-        if let Some(note) = picked(choice, resolved.as_ref()) {
-            context.note(note);
-        }
         if let Some(loss) = baked.loss {
             context.note(format!("{}: {loss}", self.out.display()));
         }
@@ -65,17 +61,9 @@ impl Skin {
     }
 
     /// The strategy, its average made a sum of quaternions with signs if continuity was asked for.
-    fn choice(&self) -> Result<Choice> {
-        let choice = self.posing.strategy();
-        if self.continuity.is_none() {
-            return Ok(choice);
-        }
-        match choice {
-            Choice::Fixed(strategy) => Ok(Choice::Fixed(continued(strategy)?)),
-            Choice::Auto(_) => {
-                bail!("--continuity with --strategy {choice}; expected a strategy that is given")
-            }
-        }
+    fn strategy(&self) -> Result<Strategy> {
+        let strategy = self.posing.strategy();
+        if self.continuity.is_some() { continued(strategy) } else { Ok(strategy) }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Protocols and strategies by their specs: the one place where experiments meet the layers that define them.
 
 use skinsplat_metrics::{MetricsError, Protocol};
-use skinsplat_posing::{Choice, Strategy, StrategyError};
+use skinsplat_posing::{Strategy, StrategyError};
 
 /// The protocol of a spec.
 ///
@@ -19,14 +19,6 @@ pub(super) fn protocol(spec: &str) -> Result<Protocol, (String, String)> {
 /// # Errors
 /// What is wrong with the spec, and what is known.
 pub(super) fn strategy(spec: &str) -> Result<Strategy, (String, String)> {
-    spec.parse().map_err(|error| explained(spec, error))
-}
-
-/// The strategy of a spec, or what picks one for each pose.
-///
-/// # Errors
-/// What is wrong with the spec, and what is known.
-pub(super) fn choice(spec: &str) -> Result<Choice, (String, String)> {
     spec.parse().map_err(|error| explained(spec, error))
 }
 

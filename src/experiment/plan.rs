@@ -12,7 +12,7 @@ use skinsplat_fit::FitOptions;
 use skinsplat_fit::Recipe;
 use skinsplat_fit::recipe::Surface;
 use skinsplat_metrics::{MetricKind, Protocol, ProtocolId};
-use skinsplat_posing::Choice;
+use skinsplat_posing::Strategy;
 use std::collections::BTreeSet;
 
 /// Everything that a run has to do and a report has to show, as plain data.
@@ -225,7 +225,7 @@ impl Builder<'_> {
         };
         let strategy = match &variant.strategy {
             None => None,
-            Some(spec) => Some(catalog::choice(spec).map_err(|why| invalid("strategy", why))?),
+            Some(spec) => Some(catalog::strategy(spec).map_err(|why| invalid("strategy", why))?),
         };
         let avatar = self.avatar(variant, row).map_err(|why| invalid("avatar", why))?;
         Ok(Prepared { variant: variant.clone(), avatar, strategy })
@@ -363,7 +363,7 @@ struct Prepared {
     /// Key of the avatar.
     avatar: String,
     /// The strategy in full, so that two specs of one strategy share their keys.
-    strategy: Option<Choice>,
+    strategy: Option<Strategy>,
 }
 
 fn find_sequence<'a>(subject: &'a SubjectInfo, id: &str) -> &'a SequenceInfo {

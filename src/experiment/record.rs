@@ -38,9 +38,6 @@ pub enum Outcome {
         splats: Option<u64>,
         /// Gaussians that reach the image; none for a textured mesh.
         visible_splats: Option<u64>,
-        /// The strategy that `auto` picked for the pose; none for one that was given.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        picked: Option<String>,
     },
     /// Failed: the error, one line. The next run tries again.
     Error(String),

@@ -99,7 +99,7 @@ fn variant_is_possible(variant: &Variant, key: &str, file: &str) -> Result<(), E
             return fail("strategy", "given".into(), "none: a textured mesh has no Gaussians");
         }
         (Some(spec), true) => {
-            if let Err((problem, expected)) = catalog::choice(spec) {
+            if let Err((problem, expected)) = catalog::strategy(spec) {
                 return fail("strategy", problem, &expected);
             }
         }

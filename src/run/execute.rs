@@ -169,6 +169,6 @@ fn run_variant(
     let wanted = Wanted { ssim: job.ssim, lpips: job.lpips.then_some(distances) };
     let score = protocol.score_with(&drawn.image, truth, wanted)?;
     seconds.score = start.elapsed().as_secs_f64();
-    let Drawn { splats, visible_splats, picked, .. } = drawn;
-    Ok(Outcome::Scored { score, splats, visible_splats, picked })
+    let Drawn { splats, visible_splats, .. } = drawn;
+    Ok(Outcome::Scored { score, splats, visible_splats })
 }

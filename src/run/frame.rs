@@ -7,7 +7,7 @@ use skinsplat_core::scene::{Camera, Image, Mask, Pose, Posed, PosedBody, Rendere
 use skinsplat_data::{Sequence, Truth};
 use skinsplat_fit::texture::{SAMPLES, TexturedBody};
 use skinsplat_metrics::Protocol;
-use skinsplat_posing::{Choice, PoseBuffers, Views};
+use skinsplat_posing::{PoseBuffers, Strategy};
 use skinsplat_render::mesh::SamplePattern;
 use skinsplat_render::splat::{RenderSettings, Renderer};
 use std::time::Instant;
@@ -44,15 +44,13 @@ impl<'a> Frame<'a> {
                 let pattern = SamplePattern::new(SAMPLES);
                 let image = textured.draw(self.pose, self.camera, pattern, background)?.image;
                 seconds.render = start.elapsed().as_secs_f64();
-                return Ok(Drawn { image, splats: None, visible_splats: None, picked: None });
+                return Ok(Drawn { image, splats: None, visible_splats: None });
             }
             Prepared::Gaussians(bound) => (bound, None),
             Prepared::Hybrid(bound, mesh) => (bound, Some(mesh)),
         };
-        let choice: Choice = variant.strategy.as_deref().unwrap_or_default().parse()?;
+        let strategy: Strategy = variant.strategy.as_deref().unwrap_or_default().parse()?;
         let start = Instant::now();
-        let skinsplat_posing::Resolved { strategy, bound: proved } =
-            choice.resolve(bound, &self.body, Views::Few(1))?;
         let posed = skinsplat_posing::pose_seen(
             bound,
             &self.body,
@@ -69,8 +67,7 @@ impl<'a> Frame<'a> {
         };
         seconds.render = start.elapsed().as_secs_f64();
         let (splats, visible) = (posed.len() as u64, renderer.visible() as u64);
-        let picked = proved.map(|_| strategy.to_string());
-        Ok(Drawn { image, splats: Some(splats), visible_splats: Some(visible), picked })
+        Ok(Drawn { image, splats: Some(splats), visible_splats: Some(visible) })
     }
 }
 
@@ -97,8 +94,6 @@ pub(super) struct Drawn {
     pub(super) splats: Option<u64>,
     /// Those that reach the image.
     pub(super) visible_splats: Option<u64>,
-    /// The strategy, if it was picked for the pose.
-    pub(super) picked: Option<String>,
 }
 
 /// The background of a job's protocol.

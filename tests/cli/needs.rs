@@ -1,4 +1,4 @@
-//! `inspect --needs` and `--strategy auto:TOLERANCE`.
+//! `inspect --needs`.
 
 use crate::args;
 use crate::made_up;
@@ -54,12 +54,6 @@ fn what_a_made_up_avatar_needs() {
     assert_eq!(bound("closed-form")["proved"], 0.0);
     let verdict = &found["verdict"];
     assert_eq!(verdict["cheapest"]["rotation"], "closed-form");
-    assert_eq!(
-        verdict["picks"],
-        serde_json::json!([
-            { "rotation": "power-0", "poses": 1 }, { "rotation": "closed-form", "poses": 1 },
-        ])
-    );
     assert_eq!(verdict["gram_schmidt"], false);
     assert!(verdict["power_steps"].as_u64().unwrap() > 0);
 }
@@ -121,72 +115,4 @@ fn bad_needs_are_refused() {
         args!["inspect", "--needs", "loose.ply", "--poses", "poses.npz", "--body", "body.npz"],
         &["loose.ply", "binding"],
     );
-}
-
-fn posing(frame: &str, strategy: &str) -> Vec<OsString> {
-    args!["--body", "body.npz", "--poses", "poses.npz", "--frame", frame, "--strategy", strategy]
-}
-
-/// The heaviest bone is right at rest; further on it is within its bound, and for a hundredth only the exact average is.
-#[test]
-fn auto_picks_for_each_pose_and_says_what() {
-    let desk = made_up::desk();
-    for (frame, strategy, picked) in [
-        ("0", "auto:1", "power-0"),
-        ("1", "auto:10", "power-0"),
-        ("1", "auto:0.01", "auto:0.01: quaternion-average,"),
-    ] {
-        let mut skin = args!["skin", "avatar.ply", "--out", "posed.ply"];
-        skin.extend(posing(frame, strategy));
-        let answer = desk.run(skin).exits(0, strategy);
-        assert!(answer.err.contains(picked) && answer.err.contains("within"), "{strategy}: {}", answer.err);
-        let mut render = args!["render", "avatar.ply", "--camera", "camera.json", "--out", "posed.png"];
-        render.extend(posing(frame, strategy));
-        let answer = desk.run(render).exits(0, strategy);
-        assert!(answer.err.contains(picked), "{strategy}: {}", answer.err);
-    }
-    let skin = |out: &str, strategy: &str| {
-        let mut skin = args!["skin", "avatar.ply", "--out", out, "-q"];
-        skin.extend(posing("1", strategy));
-        desk.ok(skin);
-        desk.bytes(out)
-    };
-    assert!(skin("a.ply", "auto:0.01") == skin("b.ply", "quaternion-average"));
-}
-
-#[test]
-fn impossible_tolerances_are_refused_with_the_smallest() {
-    let desk = made_up::desk();
-    for strategy in ["auto:0", "auto:-1", "auto:nan", "auto:1e-9"] {
-        let mut skin = args!["skin", "avatar.ply", "--out", "posed.ply"];
-        skin.extend(posing("1", strategy));
-        desk.run(skin).refuses(&[strategy, "at least 8.20e-5"], strategy);
-        assert!(!desk.path("posed.ply").exists());
-    }
-    let mut skin = args!["skin", "avatar.ply", "--out", "posed.ply"];
-    skin.extend(posing("1", "auto:1+rotation=nlerp"));
-    desk.run(skin).refuses(&["rotation=nlerp", "auto"], "rotation");
-}
-
-/// A run keeps what was picked; frames redone give the same records.
-#[test]
-fn runs_record_what_was_picked() {
-    let desk = Desk::new();
-    let table =
-        include_str!("tiny.toml").replace("strategy = \"quaternion-average\"", "strategy = \"auto:0.5\"");
-    desk.put("tiny.toml", table);
-    desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1", "--variant", "skinned"]);
-    let store = desk.read("run/frames.jsonl");
-    let picked: Vec<Value> = store.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()).collect();
-    let picked: Vec<&Value> =
-        picked.iter().filter_map(|line| line.pointer("/frame/outcome/scored/picked")).collect();
-    assert!(!picked.is_empty(), "{store}");
-    for picked in picked {
-        let picked = picked.as_str().unwrap();
-        // One view of each pose: the view direction is turned, not the SH.
-        assert!(
-            picked.starts_with("quaternion-average") && picked.contains("colour=view-rotation"),
-            "{picked}"
-        );
-    }
 }

@@ -93,7 +93,7 @@ pub(super) fn record(key: &str, outcome: Outcome) -> FrameRecord {
 }
 
 pub(super) fn scored(key: &str, score: FrameScore) -> FrameRecord {
-    record(key, Outcome::Scored { score, splats: Some(100), visible_splats: Some(90), picked: None })
+    record(key, Outcome::Scored { score, splats: Some(100), visible_splats: Some(90) })
 }
 
 /// A score for everything in the plan: frame k of variant v in row r has PSNR `20 + r + v / 2 + k / 10`.

@@ -1,7 +1,6 @@
 //! The axes of a strategy as plain data: closed enums, each variant with a stable id.
 
 use super::StrategyError;
-use serde::{Deserialize, Serialize};
 use skinsplat_core::math::average::Solver;
 use skinsplat_core::math::rotation::SignPolicy;
 use skinsplat_core::scene::ColourClamp;
@@ -13,8 +12,9 @@ use std::str::FromStr;
 /// For a Gaussian with canonical rotation R_c, scales S, SH s and skinning weights w_j, and joints with rotations R_j
 /// relative to the rest pose, B = Σ w_j R_j is the blend (the linear part of LBS) and R the rotation that
 /// [`RotationChoice`] makes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Strategy {
     /// Where R comes from.
     pub rotation: RotationChoice,
@@ -23,7 +23,7 @@ pub struct Strategy {
     /// What becomes of the colour.
     pub colour: ColourChoice,
     /// How colours leave the SH evaluation.
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     pub clamp: ClampChoice,
 }
 
@@ -56,8 +56,9 @@ pub enum FaceFrame {
 }
 
 /// Where the rotation R of a Gaussian relative to its canonical orientation comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
 pub enum RotationChoice {
     /// The LBS matrix, made a rotation.
     Lbs(LbsProjection),
@@ -77,8 +78,9 @@ pub enum RotationChoice {
 }
 
 /// What becomes of Σ_c = R_c S² R_cᵀ.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum CovarianceChoice {
     /// R Σ_c Rᵀ.
     Rotate,
@@ -91,8 +93,9 @@ pub enum CovarianceChoice {
 }
 
 /// What becomes of the SH.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum ColourChoice {
     /// Nothing: highlights stay fixed in the world.
     None,
@@ -102,13 +105,16 @@ pub enum ColourChoice {
     ViewBlend,
     /// View directions multiplied by B⁻¹ (up to length): what Bᵀ is sometimes taken for.
     ViewBlendInverse,
-    /// View directions multiplied by Rᵀ: the image of `RotateSh`, for nine multiplications per Gaussian and view.
+    /// View directions multiplied by Rᵀ: the image of `RotateSh` (within 2.4e-7), for nine multiplications per Gaussian and
+    /// view. The choice for a pose that is seen once: posing and rendering are 1.26 times faster at degree 3
+    /// (`reports/trade`, "Only what a scene requires").
     ViewRotation,
 }
 
 /// How colours leave the SH evaluation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum ClampChoice {
     /// At 0 from below, as 3DGS does.
     #[default]

@@ -1,21 +1,19 @@
 //! What can be wrong when an avatar is bound or posed.
 
 use skinsplat_core::scene::SceneError;
+use std::fmt;
 
 /// Why an avatar cannot be bound or posed, or a strategy not be understood.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum StrategyError {
     /// The avatar or the body breaks an invariant.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
+    Scene(SceneError),
     /// A strategy reads faces, and the body has none.
-    #[error("strategy {strategy}: the body has no faces; expected a body with a mesh")]
     NoFaces {
         /// The strategy, as text.
         strategy: String,
     },
     /// The posed body is not the one that the avatar was bound to.
-    #[error("body: {found}; expected {expected} as in the body that the avatar was bound to")]
     OtherBody {
         /// Counts of the posed body.
         found: String,
@@ -23,7 +21,6 @@ pub enum StrategyError {
         expected: String,
     },
     /// An id that nothing has.
-    #[error("{axis}: unknown {id:?}; expected one of {expected}")]
     UnknownId {
         /// The axis of the strategy.
         axis: &'static str,
@@ -33,23 +30,36 @@ pub enum StrategyError {
         expected: String,
     },
     /// A part of a strategy's text that is no `axis=choice`.
-    #[error("strategy: {part:?}; expected {expected}")]
     BadVariation {
         /// What was given.
         part: String,
         /// What was expected.
         expected: String,
     },
-    /// A tolerance that nothing reaches.
-    #[error(
-        "tolerance {asked} degrees cannot be kept; the smallest that can is {reachable:.2e} degrees {place}"
-    )]
-    Tolerance {
-        /// What was asked for.
-        asked: f64,
-        /// The smallest tolerance that can be kept, degrees.
-        reachable: f64,
-        /// Of what: any pose, or this one.
-        place: &'static str,
-    },
+}
+
+impl fmt::Display for StrategyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Scene(error) => error.fmt(f),
+            Self::NoFaces { strategy } => {
+                write!(f, "strategy {strategy}: the body has no faces; expected a body with a mesh")
+            }
+            Self::OtherBody { found, expected } => {
+                write!(f, "body: {found}; expected {expected} as in the body that the avatar was bound to")
+            }
+            Self::UnknownId { axis, id, expected } => {
+                write!(f, "{axis}: unknown {id:?}; expected one of {expected}")
+            }
+            Self::BadVariation { part, expected } => write!(f, "strategy: {part:?}; expected {expected}"),
+        }
+    }
+}
+
+impl std::error::Error for StrategyError {}
+
+impl From<SceneError> for StrategyError {
+    fn from(error: SceneError) -> Self {
+        Self::Scene(error)
+    }
 }

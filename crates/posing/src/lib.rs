@@ -18,7 +18,6 @@
 //! [`Posed`]: skinsplat_core::scene::Posed
 
 mod adjoint;
-mod auto;
 mod bake;
 mod blend;
 mod bound;
@@ -43,7 +42,6 @@ mod spec;
 mod surfel;
 
 pub use adjoint::pose_backward;
-pub use auto::{Auto, CANDIDATES, Choice, Resolved, Views};
 pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;
 pub use choices::{

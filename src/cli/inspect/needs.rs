@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result, bail};
 use skinsplat_core::scene::{Binding, Body, Pose, RestBody};
 use skinsplat_data::{body, ply, poses};
 use skinsplat_posing::needs::{Degrees, Extreme, Needs};
-use skinsplat_posing::{Auto, BoundAvatar, RotationChoice};
+use skinsplat_posing::{BoundAvatar, RotationChoice};
 use std::path::{Path, PathBuf};
 
 /// Pairs that are listed; JSON has them all.
@@ -40,7 +40,7 @@ pub(super) struct Motion {
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {
-    Auto::parse_tolerance(text).map_err(|expected| format!("expected {expected}"))
+    Needs::parse_tolerance(text).map_err(|expected| format!("expected {expected}"))
 }
 
 impl Motion {
@@ -123,16 +123,7 @@ fn text(needs: &Needs, body: &RestBody) -> String {
     for (kept, degrees) in needs.fewer_influences.iter().enumerate() {
         text += &format!("    {:<24} {degrees}\n", kept + 1);
     }
-    let picks = needs.verdict.picks.iter().map(|pick| {
-        let name = pick.rotation.map_or("none".to_owned(), |rotation| rotation.to_string());
-        format!("{name} in {}", poses_text(pick.poses))
-    });
-    text += &line(&format!("auto:{} picks", needs.verdict.tolerance), picks.collect::<Vec<_>>().join(", "));
     text + &line("verdict", &needs.verdict)
-}
-
-fn poses_text(n: usize) -> String {
-    if n == 1 { "1 pose".to_owned() } else { format!("{n} poses") }
 }
 
 fn at(extreme: Extreme, unit: &str) -> String {

@@ -5,7 +5,8 @@ use glam::Vec3;
 
 /// Gaussians with the parameters of a 3DGS PLY, as stored there: nothing activated, so that a file round-trips bit for
 /// bit and an optimiser can step on them.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gaussians {
     /// Positions, metres, in the rest pose of the body.
     pub means: Vec<Vec3>,
@@ -113,7 +114,8 @@ impl Gaussians {
 }
 
 /// Where face-bound Gaussians sit: `Σ barycentric_k v_k + offset * n` on a face of the body.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FaceBinding {
     /// Face index per Gaussian.
     pub faces: Vec<u32>,
@@ -124,7 +126,8 @@ pub struct FaceBinding {
 }
 
 /// How Gaussians move with a body.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Binding {
     /// Not at all: a static scene.
     Static,
@@ -135,7 +138,8 @@ pub enum Binding {
 }
 
 /// Canonical Gaussians and their binding.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Avatar {
     /// The Gaussians in the rest pose.
     pub gaussians: Gaussians,

@@ -20,8 +20,7 @@ pub use skin_weights::SkinWeights;
 
 /// A scene value that breaks an invariant. `field` names the part, `expected` says what it should have been; the data
 /// layer adds the file.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{field}: {problem}; expected {expected}")]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SceneError {
     /// Which field is wrong, with an index where there is one ("weights\[17\]").
     pub field: String,
@@ -30,6 +29,15 @@ pub struct SceneError {
     /// What was expected instead.
     pub expected: String,
 }
+
+impl std::fmt::Display for SceneError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { field, problem, expected } = self;
+        write!(f, "{field}: {problem}; expected {expected}")
+    }
+}
+
+impl std::error::Error for SceneError {}
 
 impl SceneError {
     /// Builds an error from its three parts.

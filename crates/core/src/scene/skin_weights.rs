@@ -3,7 +3,9 @@
 use super::SceneError;
 
 /// Joint indices and weights of each row (vertex or Gaussian). Rows sum to one within [`SkinWeights::SUM_TOLERANCE`].
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Unchecked"))]
 pub struct SkinWeights {
     offsets: Vec<u32>,
     joints: Vec<u16>,
@@ -25,16 +27,9 @@ impl SkinWeights {
     {
         let mut table = Self { offsets: vec![0], joints: Vec::new(), weights: Vec::new() };
         for (i, row) in rows.into_iter().enumerate() {
-            let mut sum = 0.0f64;
+            let start = table.weights.len();
             for (joint, weight) in row {
-                if !(weight.is_finite() && weight >= 0.0) {
-                    let expected = "a finite number, at least 0";
-                    return Err(SceneError::new(
-                        format!("weights[{i}]"),
-                        format!("weight {weight}"),
-                        expected,
-                    ));
-                }
+                check_weight(i, weight)?;
                 if weight == 0.0 {
                     continue;
                 }
@@ -42,13 +37,10 @@ impl SkinWeights {
                     let expected = format!("an index below {num_joints}");
                     return Err(SceneError::new(format!("joints[{i}]"), format!("joint {joint}"), expected));
                 }
-                sum += f64::from(weight);
                 table.joints.push(joint as u16);
                 table.weights.push(weight);
             }
-            if (sum - 1.0).abs() > Self::SUM_TOLERANCE {
-                return Err(SceneError::new(format!("weights[{i}]"), format!("sum {sum}"), "a sum of 1"));
-            }
+            check_row(i, &table.weights[start..])?;
             table.offsets.push(table.joints.len() as u32);
         }
         Ok(table)
@@ -88,6 +80,58 @@ impl SkinWeights {
     }
 }
 
+/// That the weights of row `i` are usable and sum to one.
+fn check_row(i: usize, weights: &[f32]) -> Result<(), SceneError> {
+    weights.iter().try_for_each(|&weight| check_weight(i, weight))?;
+    let sum: f64 = weights.iter().map(|&weight| f64::from(weight)).sum();
+    if (sum - 1.0).abs() > SkinWeights::SUM_TOLERANCE {
+        return Err(SceneError::new(format!("weights[{i}]"), format!("sum {sum}"), "a sum of 1"));
+    }
+    Ok(())
+}
+
+fn check_weight(i: usize, weight: f32) -> Result<(), SceneError> {
+    if weight.is_finite() && weight >= 0.0 {
+        return Ok(());
+    }
+    Err(SceneError::new(format!("weights[{i}]"), format!("weight {weight}"), "a finite number, at least 0"))
+}
+
+/// The table as it is stored: nothing holds of it yet.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(rename = "SkinWeights")]
+struct Unchecked {
+    offsets: Vec<u32>,
+    joints: Vec<u16>,
+    weights: Vec<f32>,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for SkinWeights {
+    type Error = SceneError;
+
+    /// Joint indices are those of a body, which is not known here: [`Avatar::validate`](super::Avatar::validate) checks
+    /// them.
+    fn try_from(stored: Unchecked) -> Result<Self, SceneError> {
+        let Unchecked { offsets, joints, weights } = stored;
+        if joints.len() != weights.len() {
+            let problem = format!("{} values", joints.len());
+            return Err(SceneError::new("joints", problem, format!("{}, one per weight", weights.len())));
+        }
+        let ends = offsets.first().zip(offsets.last());
+        let whole = ends.is_some_and(|(&first, &last)| first == 0 && last as usize == weights.len());
+        if !whole || !offsets.is_sorted() {
+            let expected = format!("ascending, from 0 to {}", weights.len());
+            return Err(SceneError::new("offsets", "they are not those of the weights", expected));
+        }
+        for (i, row) in offsets.windows(2).enumerate() {
+            check_row(i, &weights[row[0] as usize..row[1] as usize])?;
+        }
+        Ok(Self { offsets, joints, weights })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,6 +156,28 @@ mod tests {
         ] {
             let error = SkinWeights::from_rows([vec![(0, 1.0)], row], 3).unwrap_err();
             assert_eq!(error.field, field, "{error}");
+        }
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn stored_tables_are_checked() {
+        let weights = SkinWeights::from_rows([vec![(2, 0.75), (1, 0.25)], vec![(0, 1.0)]], 3).unwrap();
+        let stored = serde_json::to_string(&weights).unwrap();
+        assert_eq!(stored, r#"{"offsets":[0,2,3],"joints":[2,1,0],"weights":[0.75,0.25,1.0]}"#);
+        assert_eq!(serde_json::from_str::<SkinWeights>(&stored).unwrap(), weights);
+        for (found, broken, field) in [
+            ("[0,2,3]", "[]", "offsets"),
+            ("[0,2,3]", "[0,2,4]", "offsets"),
+            ("[0,2,3]", "[0,3,2,3]", "offsets"),
+            ("[0,2,3]", "[1,2,3]", "offsets"),
+            ("[0,2,3]", "[0,3,3]", "weights[0]"),
+            ("[2,1,0]", "[2,1]", "joints"),
+            ("0.75", "-0.75", "weights[0]"),
+            ("1.0", "0.5", "weights[1]"),
+        ] {
+            let error = serde_json::from_str::<SkinWeights>(&stored.replace(found, broken)).unwrap_err();
+            assert!(error.to_string().starts_with(field), "{broken}: {error}");
         }
     }
 }

@@ -12,18 +12,17 @@ mod verdict;
 
 pub(super) use groups::{Group, groups};
 pub use pose::PoseBounds;
-pub(super) use theory::rounding;
-pub use verdict::{Pick, Verdict};
+pub use verdict::Verdict;
 
 use super::{BoundAvatar, RotationChoice};
 use rayon::prelude::*;
-use serde::{Serialize, Serializer};
 use skinsplat_core::math::rotation;
 use skinsplat_core::scene::{Pose, PosedBody, RestBody, SceneError};
 use std::collections::BTreeMap;
 
 /// What an avatar and a motion need.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Needs {
     /// Gaussians.
     pub gaussians: usize,
@@ -56,7 +55,8 @@ pub struct Needs {
 }
 
 /// A value and the pose in which it was found.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Extreme {
     /// Degrees, or a gap in \[0, 1\].
     pub value: f64,
@@ -65,7 +65,8 @@ pub struct Extreme {
 }
 
 /// Two joints that share a Gaussian.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Pair {
     /// Indices, ascending.
     pub joints: [u16; 2],
@@ -76,7 +77,8 @@ pub struct Pair {
 }
 
 /// How far a rotation choice can be from the exact average.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Bound {
     /// The choice.
     pub rotation: RotationChoice,
@@ -90,8 +92,9 @@ pub struct Bound {
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Degrees(pub f64);
 
-impl Serialize for Degrees {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+#[cfg(feature = "serde")]
+impl serde::Serialize for Degrees {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         if self.0.is_finite() { serializer.serialize_f64(self.0) } else { serializer.serialize_none() }
     }
 }
@@ -178,6 +181,23 @@ impl Needs {
             fewer_influences: (1..=groups::KEPT)
                 .map(|kept| over(&|frame| frame.fewer_influences(kept)))
                 .collect(),
+        })
+    }
+
+    /// The smallest tolerance that any pose can keep, degrees: what `f32` leaves of one bone.
+    pub fn smallest_tolerance() -> f64 {
+        theory::rounding::STORED.to_degrees()
+    }
+
+    /// A tolerance from text.
+    ///
+    /// # Errors
+    /// What was expected: a number that is not too small for any pose.
+    pub fn parse_tolerance(text: &str) -> Result<f64, String> {
+        let smallest = Self::smallest_tolerance();
+        let usable = |degrees: &f64| degrees.is_finite() && *degrees >= smallest;
+        text.parse().ok().filter(usable).ok_or_else(|| {
+            format!("a tolerance in degrees such as 0.5, finite and at least {smallest:.2e}")
         })
     }
 

@@ -2,11 +2,11 @@
 
 use super::super::{Matrix3, Quaternion, Real, dot4};
 use super::normalize;
-use serde::{Deserialize, Serialize};
 
 /// Which of the two quaternions of a rotation is meant.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum SignPolicy {
     /// w ≥ 0 (PyTorch3D since 0.7.6). Where w is 0 the first non-zero component is positive.
     #[default]

@@ -10,7 +10,7 @@ use skinsplat_core::math::rotation::angle_between;
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::{Avatar, Camera, Image, Pose, Posed, PosedBody, RestBody};
 use skinsplat_posing::{
-    BoundAvatar, Choice, PoseBuffers, Strategy, StrategyError, Views, pose_into, pose_seen,
+    BoundAvatar, PoseBuffers, Strategy, StrategyError, pose_into, pose_seen,
 };
 use skinsplat_render::splat::{RenderSettings, Renderer};
 use std::hint::black_box;
@@ -26,7 +26,6 @@ pub(super) fn all(scene: &Scene, options: &Options) -> Result<Vec<Saving>, Error
     Ok(vec![
         bench.unread_joints()?,
         bench.few_bones()?,
-        bench.auto()?,
         bench.zero_bands(1)?,
         bench.zero_bands(0)?,
         bench.view_direction()?,
@@ -176,29 +175,6 @@ impl<'a> Bench<'a> {
             what,
             strategy("quaternion-average+rotation=eigen+colour=none")?,
             strategy("quaternion-average+colour=none")?,
-        )
-    }
-
-    /// The cheapest rotation within half a degree, bounds included in its time.
-    fn auto(&self) -> Result<Saving, Error> {
-        const TOLERANCE: f64 = 0.5;
-        let exact = strategy("quaternion-average+colour=none")?;
-        let choice: Choice = format!("auto:{TOLERANCE}+colour=none").parse()?;
-        let mut largest = 0.0f64;
-        for body in &self.bodies {
-            let (mut a, mut b) = (PoseBuffers::default(), PoseBuffers::default());
-            let picked = choice.resolve(&self.bound, body, Views::Any)?.strategy;
-            let posed = pose_into(&self.bound, body, &exact, &mut a)?;
-            largest = largest.max(turned(&posed, &pose_into(&self.bound, body, &picked, &mut b)?));
-        }
-        self.posing(
-            format!("auto:{TOLERANCE} in place of the exact average; SH left alone"),
-            |body, buffers| self.repose(body, &exact, buffers),
-            |body, buffers| {
-                let picked = choice.resolve(&self.bound, body, Views::Any)?.strategy;
-                self.repose(body, &picked, buffers)
-            },
-            compared(largest, TOLERANCE, "degrees"),
         )
     }
 
