@@ -4,7 +4,7 @@
 
 use skinsplat::datasets::Registry;
 use skinsplat::run::held_out::held_out;
-use skinsplat_core::scene::{Avatar, Binding, Image, Mask};
+use skinsplat_core::scene::{Avatar, Binding, Camera, Image, Mask};
 use skinsplat_data::{FrameGenerator, FrameRef, FrameSource, Sequence, Subject, Truth};
 use skinsplat_fit::Error;
 use skinsplat_fit::texture::SAMPLES;
@@ -231,9 +231,8 @@ fn useless_frames_are_passed_over_with_a_warning_and_refused_if_there_is_no_othe
     assert!(trainer.take_warnings()[0].contains("misses the body"));
 
     let mut away = training.clone();
-    for camera in &mut away.cameras {
-        camera.cx += 1e4;
-    }
+    let moved = |camera: &Camera| Camera { cx: camera.cx + 1e4, ..camera.clone() };
+    away.cameras = away.cameras.iter().map(moved).collect::<Vec<_>>().into();
     let mut trainer = Trainer::new(&away, &options, first).unwrap();
     assert!(trainer.step().is_err());
     assert!(trainer.take_warnings()[0].contains("outside the image"));

@@ -189,8 +189,8 @@ fn subject(body: &RestBody) -> Subject {
     let sequence = Sequence {
         id: "test".to_owned(),
         body: Arc::new(body.clone()),
-        poses: poses.collect(),
-        cameras: vec![camera],
+        poses: poses.collect::<Vec<_>>().into(),
+        cameras: vec![camera].into(),
         frames: (0..3).map(frame).collect(),
         stored_sizes: None,
     };

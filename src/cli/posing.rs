@@ -78,7 +78,7 @@ impl Posing {
     fn poses_to_frame(&self, path: &Path, model: &Body) -> Result<(RestBody, Pose, Vec<Pose>)> {
         let track = poses::load_clip(path, self.clip.as_deref())?;
         let rest = model.shaped(&track.betas).with_context(|| format!("{}", path.display()))?;
-        let mut poses = track.poses(&rest.skeleton)?;
+        let mut poses = track.poses(&rest.skeleton)?.to_vec();
         if self.frame >= poses.len() {
             bail!("{}: --frame {}; expected a frame below {}", path.display(), self.frame, poses.len());
         }

@@ -10,7 +10,9 @@ use serde_json::{Value, json};
 use skinsplat_data::key::content_key;
 use skinsplat_fit::FitOptions;
 use skinsplat_fit::Recipe;
-use skinsplat_fit::recipe::Surface;
+use skinsplat_fit::surface::SurfaceInit;
+use skinsplat_fit::texture::TextureInit;
+use skinsplat_fit::train::Starting;
 use skinsplat_metrics::{MetricKind, Protocol, ProtocolId};
 use skinsplat_posing::Strategy;
 use std::collections::BTreeSet;
@@ -273,7 +275,11 @@ impl Builder<'_> {
                     "iterations": options.iterations, "seed": options.seed,
                 }),
                 None => {
-                    json!({ "made": of_frames, "recipe": variant.avatar, "sh_degree": variant.sh_degree })
+                    let defaults = (SurfaceInit::default(), TextureInit::default());
+                    json!({
+                        "made": of_frames, "recipe": variant.avatar, "sh_degree": variant.sh_degree,
+                        "defaults": defaults,
+                    })
                 }
             };
             build = AvatarBuild { sequence: Some(sequence), frames, resolution, fit, ..build };
@@ -295,10 +301,7 @@ impl Builder<'_> {
         let profile = &self.options.profile;
         let iterations = profile.fit_iterations.map_or(recipe.iterations, |most| recipe.iterations.min(most));
         let options = FitOptions { recipe, iterations, seed: *seed, edge_mm: profile.avatar_edge_mm };
-        let how = &options.recipe.start;
-        let first_stage =
-            (how.surface == Surface::Silhouettes).then(|| (options.shape_iterations(), options.seed));
-        let start = content_key(&json!({ "start": of_frames, "how": how, "first_stage": first_stage }));
+        let start = content_key(&json!({ "start": of_frames, "how": Starting::of(&options) }));
         Ok(Some(PlannedFit { options, start }))
     }
 

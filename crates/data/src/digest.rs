@@ -1,52 +1,77 @@
-//! Content digests: SHA-256 over the bits of everything that a sequence holds.
+//! Content digests: SHA-256 over what a sequence was read or generated from.
 
-use super::{Error, FrameSource, Sequence, error};
+use super::sourced::SourceDigest;
+use super::{Error, FrameSource, Sequence, Truth, error};
 use glam::{DAffine3, DQuat, DVec3};
 use sha2::{Digest, Sha256};
-use skinsplat_core::scene::{Camera, Pose, RestBody};
+use skinsplat_core::scene::{Camera, LocalTransform, Pose, RestBody};
 
 impl Sequence {
-    /// SHA-256 of the stored images and masks (or the generators' keys), cameras, poses and body, in hexadecimal: equal
-    /// digests mean that an evaluation sees the same data. Names and paths do not count.
+    /// SHA-256 in hexadecimal of the stored images and masks (or the generators' keys), of the stored numbers behind poses
+    /// and cameras, and of the body: equal digests mean that an evaluation sees the same data. Angles count as they are
+    /// stored, not the sines of them; the body is a polynomial of stored numbers. Names and paths do not count.
     ///
     /// # Errors
     /// If a file cannot be read.
     pub fn digest(&self) -> Result<String, Error> {
-        let mut hash = Fingerprint(Sha256::new());
-        hash.body(&self.body);
-        hash.count(self.poses.len());
-        self.poses.iter().for_each(|pose| hash.pose(pose));
-        hash.count(self.cameras.len());
-        self.cameras.iter().for_each(|camera| hash.camera(camera));
+        let mut hash = Fingerprint::new();
+        self.body.add_to(&mut hash);
+        hash.bytes(&self.poses.digest().0);
+        hash.bytes(&self.cameras.digest().0);
         hash.count(self.frames.len());
         for frame in &self.frames {
             hash.count(frame.pose);
             hash.count(frame.camera);
             hash.source(&frame.source)?;
         }
-        Ok(hash.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+        Ok(hash.finish().to_string())
     }
 }
 
+/// What has a digest of its own numbers.
+pub trait Content {
+    /// Adds every number to a hash.
+    fn add_to(&self, hash: &mut Fingerprint);
+}
+
 /// A running hash. Lists are preceded by their length, so that no two contents give one stream of bytes.
-struct Fingerprint(Sha256);
+pub struct Fingerprint(Sha256);
 
 impl Fingerprint {
-    fn count(&mut self, n: usize) {
-        self.0.update((n as u64).to_le_bytes());
+    pub(super) fn new() -> Self {
+        Self(Sha256::new())
     }
 
-    fn bytes(&mut self, bytes: &[u8]) {
+    pub(super) fn finish(&mut self) -> SourceDigest {
+        SourceDigest(self.0.finalize_reset().into())
+    }
+
+    pub(super) fn number(&mut self, n: u64) -> &mut Self {
+        self.0.update(n.to_le_bytes());
+        self
+    }
+
+    pub(super) fn count(&mut self, n: usize) -> &mut Self {
+        self.number(n as u64)
+    }
+
+    pub(super) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
         self.count(bytes.len());
         self.0.update(bytes);
+        self
     }
 
-    fn numbers(&mut self, values: impl IntoIterator<Item = f64>) {
+    pub(super) fn numbers(&mut self, values: impl IntoIterator<Item = f64>) {
         values.into_iter().for_each(|v| self.0.update(v.to_bits().to_le_bytes()));
     }
 
-    fn vector(&mut self, v: DVec3) {
-        self.numbers(v.to_array());
+    fn singles(&mut self, values: &[f32]) {
+        values.iter().for_each(|v| self.0.update(v.to_bits().to_le_bytes()));
+    }
+
+    pub(super) fn vectors(&mut self, vectors: &[DVec3]) {
+        self.count(vectors.len());
+        vectors.iter().for_each(|v| self.numbers(v.to_array()));
     }
 
     fn quaternion(&mut self, q: DQuat) {
@@ -57,56 +82,15 @@ impl Fingerprint {
         self.numbers(m.to_cols_array());
     }
 
-    fn body(&mut self, body: &RestBody) {
-        self.count(body.skeleton.len());
-        for (parent, local) in body.skeleton.parents.iter().zip(&body.skeleton.rest_locals) {
-            self.count(parent.map_or(usize::MAX, |p| p));
-            self.vector(local.translation);
-            self.quaternion(local.rotation);
-            self.vector(local.scale);
-        }
-        self.count(body.skeleton.num_joints());
-        body.skeleton.inverse_binds.iter().for_each(|m| self.affine(m));
-        self.count(body.vertices.len());
-        body.vertices.iter().for_each(|&v| self.vector(v));
-        for i in 0..body.weights.len() {
-            let (joints, weights) = body.weights.row(i);
-            self.count(joints.len());
-            joints.iter().for_each(|&j| self.count(usize::from(j)));
-            self.numbers(weights.iter().map(|&w| f64::from(w)));
-        }
-        self.triples(&body.faces);
-        self.count(body.uv.as_ref().map_or(0, |uv| uv.coordinates.len()));
-        if let Some(uv) = &body.uv {
-            self.numbers(uv.coordinates.iter().flatten().map(|&v| f64::from(v)));
-            self.triples(&uv.faces);
-        }
-        self.count(body.pose_directions.len());
-        self.numbers(body.pose_directions.iter().flatten().flat_map(|v| v.as_dvec3().to_array()));
+    pub(super) fn local(&mut self, local: &LocalTransform) {
+        self.numbers(local.translation.to_array());
+        self.quaternion(local.rotation);
+        self.numbers(local.scale.to_array());
     }
 
     fn triples(&mut self, triples: &[[u32; 3]]) {
         self.count(triples.len());
         triples.as_flattened().iter().for_each(|i| self.0.update(i.to_le_bytes()));
-    }
-
-    fn pose(&mut self, pose: &Pose) {
-        self.vector(pose.translation);
-        self.count(pose.locals.len());
-        for local in &pose.locals {
-            self.vector(local.translation);
-            self.quaternion(local.rotation);
-            self.vector(local.scale);
-        }
-        let blend = pose.blend_shape_rotations.as_deref().unwrap_or_default();
-        self.count(blend.len());
-        blend.iter().for_each(|&q| self.quaternion(q));
-    }
-
-    fn camera(&mut self, camera: &Camera) {
-        self.numbers([f64::from(camera.width), f64::from(camera.height)]);
-        self.numbers([camera.fx, camera.fy, camera.cx, camera.cy]);
-        self.numbers(camera.camera_from_world.to_cols_array());
     }
 
     fn source(&mut self, source: &FrameSource) -> Result<(), Error> {
@@ -124,4 +108,71 @@ impl Fingerprint {
         }
         Ok(())
     }
+}
+
+impl Content for RestBody {
+    fn add_to(&self, hash: &mut Fingerprint) {
+        hash.count(self.skeleton.len());
+        for (parent, local) in self.skeleton.parents.iter().zip(&self.skeleton.rest_locals) {
+            hash.count(parent.map_or(usize::MAX, |p| p));
+            hash.local(local);
+        }
+        hash.count(self.skeleton.num_joints());
+        self.skeleton.inverse_binds.iter().for_each(|m| hash.affine(m));
+        hash.vectors(&self.vertices);
+        for i in 0..self.weights.len() {
+            let (joints, weights) = self.weights.row(i);
+            hash.count(joints.len());
+            for &joint in joints {
+                hash.count(usize::from(joint));
+            }
+            hash.numbers(weights.iter().map(|&w| f64::from(w)));
+        }
+        hash.triples(&self.faces);
+        hash.count(self.uv.as_ref().map_or(0, |uv| uv.coordinates.len()));
+        if let Some(uv) = &self.uv {
+            hash.numbers(uv.coordinates.iter().flatten().map(|&v| f64::from(v)));
+            hash.triples(&uv.faces);
+        }
+        hash.count(self.pose_directions.len());
+        hash.numbers(self.pose_directions.iter().flatten().flat_map(|v| v.as_dvec3().to_array()));
+    }
+}
+
+impl Content for Vec<Pose> {
+    fn add_to(&self, hash: &mut Fingerprint) {
+        hash.count(self.len());
+        for pose in self {
+            hash.numbers(pose.translation.to_array());
+            hash.count(pose.locals.len());
+            pose.locals.iter().for_each(|local| hash.local(local));
+            let blend = pose.blend_shape_rotations.as_deref().unwrap_or_default();
+            hash.count(blend.len());
+            blend.iter().for_each(|&q| hash.quaternion(q));
+        }
+    }
+}
+
+impl Content for Vec<Camera> {
+    fn add_to(&self, hash: &mut Fingerprint) {
+        hash.count(self.len());
+        for camera in self {
+            hash.numbers([f64::from(camera.width), f64::from(camera.height)]);
+            hash.numbers([camera.fx, camera.fy, camera.cx, camera.cy]);
+            hash.numbers(camera.camera_from_world.to_cols_array());
+        }
+    }
+}
+
+/// The digest of images in memory.
+pub(super) fn of_truths(truths: &[Truth]) -> SourceDigest {
+    let mut hash = Fingerprint::new();
+    hash.count(truths.len());
+    for truth in truths {
+        hash.count(truth.rgb.width()).count(truth.rgb.height());
+        hash.singles(truth.rgb.pixels().as_flattened());
+        hash.count(truth.alpha.width()).count(truth.alpha.height());
+        hash.singles(truth.alpha.values());
+    }
+    hash.finish()
 }

@@ -169,7 +169,7 @@ fn load_sequence(folder: &Path, id: &str, models: &mut Models) -> Result<Sequenc
     let body = models.named(&files.listing, transforms.model.as_deref(), &track.betas)?;
     let poses = track.poses(&body.skeleton)?;
     let frames = frames_of(&files, transforms.frames, poses.len(), cameras.len())?;
-    Ok(Sequence { id: id.to_owned(), body, poses, cameras, frames, stored_sizes: None })
+    Ok(Sequence { id: id.to_owned(), body, poses, cameras: cameras.into(), frames, stored_sizes: None })
 }
 
 /// Body models that were loaded for a subject, and the shapes of them that its sequences share.

@@ -1,3 +1,5 @@
+#![doc = include_str!("../README.md")]
+//!
 //! Bytes to scene types and back: the only place that knows file formats.
 //!
 //! Every reader takes a path and returns scene types or one [`Error`] that names the file, the field and what was
@@ -35,9 +37,11 @@ pub mod poses;
 mod reduce;
 pub mod select;
 pub mod sequence;
+mod sourced;
 pub mod splatting_avatar;
 
 pub use capture::Capture;
 pub use error::Error;
 pub use folder::Subject;
 pub use sequence::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
+pub use sourced::{SourceDigest, Sourced};

@@ -75,7 +75,7 @@ fn sequence(folder: &Path, id: &str, range: [usize; 3], models: &mut Models) -> 
         source: FrameSource::Files { image: images[frame].clone(), mask: Some(masks[frame].clone()) },
     };
     let frames = chosen.iter().zip(&rows).map(frame).collect();
-    Ok(Sequence { id: id.to_owned(), body, poses, cameras, frames, stored_sizes: None })
+    Ok(Sequence { id: id.to_owned(), body, poses, cameras: cameras.into(), frames, stored_sizes: None })
 }
 
 /// The files of a folder with one of the extensions, sorted by name.

@@ -2,7 +2,7 @@
 
 use super::body::Format;
 use super::npz::Archive;
-use super::{Error, error, gltf};
+use super::{Error, SourceDigest, Sourced, digest::Fingerprint, error, gltf};
 use glam::DVec3;
 use serde::Deserialize;
 use skinsplat_core::scene::{Pose, Skeleton};
@@ -27,7 +27,7 @@ enum Keys {
     /// Axis-angle vectors (radians) per frame and joint, and a translation (metres) per frame.
     AxisAngles { rotations: Vec<Vec<DVec3>>, translations: Vec<DVec3> },
     /// Poses of a glTF file's own nodes, by name.
-    Nodes { names: Vec<String>, poses: Vec<Pose> },
+    Nodes { names: Vec<String>, poses: Vec<Pose>, source: SourceDigest },
 }
 
 impl PoseTrack {
@@ -52,12 +52,12 @@ impl PoseTrack {
         }
     }
 
-    /// The poses for a skeleton. Joints that the file does not mention (an SMPL body pose without hands) keep their
-    /// rest transform.
+    /// The poses for a skeleton, with the digest of what the file stores of them. Joints that the file does not mention
+    /// (an SMPL body pose without hands) keep their rest transform.
     ///
     /// # Errors
     /// More joints in the file than in the skeleton, or nodes of a glTF clip that the skeleton does not have.
-    pub fn poses(&self, skeleton: &Skeleton) -> Result<Vec<Pose>, Error> {
+    pub fn poses(&self, skeleton: &Skeleton) -> Result<Sourced<Vec<Pose>>, Error> {
         match &self.keys {
             Keys::AxisAngles { rotations, translations } => {
                 let joints = self.num_joints();
@@ -66,25 +66,44 @@ impl PoseTrack {
                     return Err(Error::invalid(&self.path, "thetas", format!("{joints} joints"), expected));
                 }
                 let pose = |(r, &t): (&Vec<DVec3>, &DVec3)| Pose::from_axis_angles(skeleton, r, t);
-                Ok(rotations.iter().zip(translations).map(pose).collect())
+                let poses = rotations.iter().zip(translations).map(pose).collect();
+                Ok(Sourced::computed(poses, of_angles(rotations, translations)))
             }
-            Keys::Nodes { names, poses } if *names == skeleton.names => Ok(poses.clone()),
-            Keys::Nodes { names, poses } => self.retargeted(names, poses, skeleton),
+            Keys::Nodes { names, poses, source } if *names == skeleton.names => {
+                Ok(Sourced::computed(poses.clone(), *source))
+            }
+            Keys::Nodes { names, poses, source } => self.retargeted(names, poses, *source, skeleton),
         }
     }
 
-    fn retargeted(&self, names: &[String], poses: &[Pose], skeleton: &Skeleton) -> Result<Vec<Pose>, Error> {
-        let source = |name: &String| {
+    fn retargeted(
+        &self,
+        names: &[String],
+        poses: &[Pose],
+        source: SourceDigest,
+        skeleton: &Skeleton,
+    ) -> Result<Sourced<Vec<Pose>>, Error> {
+        let place = |name: &String| {
             names.iter().position(|n| n == name).ok_or_else(|| {
                 let problem = format!("no node named {name:?}");
                 Error::invalid(&self.path, "nodes", problem, "the names of the body's joints")
             })
         };
-        let sources = skeleton.names.iter().map(source).collect::<Result<Vec<_>, _>>()?;
+        let sources = skeleton.names.iter().map(place).collect::<Result<Vec<_>, _>>()?;
         let moved =
             |pose: &Pose| Pose { locals: sources.iter().map(|&s| pose.locals[s]).collect(), ..pose.clone() };
-        Ok(poses.iter().map(moved).collect())
+        let source = sources.iter().fold(source, |digest, &node| digest.and(node as u64));
+        Ok(Sourced::computed(poses.iter().map(moved).collect(), source))
     }
+}
+
+/// The digest of angles and translations as a file stores them.
+fn of_angles(rotations: &[Vec<DVec3>], translations: &[DVec3]) -> SourceDigest {
+    let mut hash = Fingerprint::new();
+    hash.count(rotations.len());
+    rotations.iter().for_each(|frame| hash.vectors(frame));
+    hash.vectors(translations);
+    hash.finish()
 }
 
 /// Loads the poses of a file: `.npz`, `transforms.json`, or a glTF file with a single clip.
@@ -103,13 +122,11 @@ pub fn load_clip(path: &Path, clip: Option<&str>) -> Result<PoseTrack, Error> {
     let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     if !is_json && Format::of(path)? == Format::Gltf {
         let rig = gltf::Rig::load(path)?;
-        let poses = rig.clip(clip).and_then(|c| c.key_poses(&rig)).map_err(|e| Error::scene(path, e))?;
-        let names = rig.body.rest.skeleton.names;
-        return Ok(PoseTrack {
-            betas: Vec::new(),
-            path: path.to_owned(),
-            keys: Keys::Nodes { names, poses },
-        });
+        let clip = rig.clip(clip).map_err(|e| Error::scene(path, e))?;
+        let poses = clip.key_poses(&rig).map_err(|e| Error::scene(path, e))?;
+        let source = clip.digest(&rig);
+        let keys = Keys::Nodes { names: rig.body.rest.skeleton.names, poses, source };
+        return Ok(PoseTrack { betas: Vec::new(), path: path.to_owned(), keys });
     }
     match clip {
         Some(name) => {

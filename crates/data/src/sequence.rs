@@ -1,11 +1,11 @@
 //! A sequence of posed frames: everything an evaluation needs, with images decoded only when asked for.
 
-use super::{Error, frames, reduce};
+use super::{Error, Sourced, digest, frames, reduce};
 use rayon::prelude::*;
 use skinsplat_core::scene::{Camera, Image, Mask, Pose, RestBody};
 use std::fmt::Debug;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Frames of one subject.
 #[derive(Clone, Debug)]
@@ -15,9 +15,9 @@ pub struct Sequence {
     /// The subject's body in its rest pose.
     pub body: Arc<RestBody>,
     /// Poses that frames refer to.
-    pub poses: Vec<Pose>,
+    pub poses: Sourced<Vec<Pose>>,
     /// Cameras that frames refer to.
-    pub cameras: Vec<Camera>,
+    pub cameras: Sourced<Vec<Camera>>,
     /// The frames, in order.
     pub frames: Vec<FrameRef>,
     /// Sizes of the images as stored, width and height per camera, where [`Sequence::reduced`] made the cameras smaller.
@@ -76,15 +76,19 @@ pub struct Truth {
 
 /// True images that were loaded before.
 #[derive(Debug)]
-struct Held(Vec<Truth>);
+struct Held {
+    truths: Vec<Truth>,
+    /// Digest of them all, once it was asked for.
+    key: OnceLock<String>,
+}
 
 impl FrameGenerator for Held {
     fn truth(&self, frame: usize) -> Truth {
-        self.0[frame].clone()
+        self.truths[frame].clone()
     }
 
     fn key(&self) -> String {
-        format!("{} frames in memory", self.0.len())
+        self.key.get_or_init(|| format!("in memory {}", digest::of_truths(&self.truths))).clone()
     }
 }
 
@@ -96,7 +100,7 @@ impl Sequence {
     pub fn held(&self) -> Result<Self, Error> {
         let frames = (0..self.frames.len()).into_par_iter();
         let truths = frames.map(|frame| self.truth(frame)).collect::<Result<Vec<_>, Error>>()?;
-        let generator: Arc<dyn FrameGenerator> = Arc::new(Held(truths));
+        let generator: Arc<dyn FrameGenerator> = Arc::new(Held { truths, key: OnceLock::new() });
         let held = |(index, frame): (usize, &FrameRef)| FrameRef {
             source: FrameSource::Generated { generator: generator.clone(), frame: index },
             ..frame.clone()
@@ -122,7 +126,10 @@ impl Sequence {
                 camera.resized(shrunk(camera.width), shrunk(camera.height))
             }
         };
-        let cameras = self.cameras.iter().map(reduced).collect();
+        let reduced: Vec<Camera> = self.cameras.iter().map(reduced).collect();
+        let same = reduced == *self.cameras;
+        let cameras =
+            if same { self.cameras.clone() } else { self.cameras.derived(reduced, u64::from(longer_side)) };
         Self { cameras, stored_sizes: Some(stored_sizes), ..self.clone() }
     }
 

@@ -1,5 +1,6 @@
 //! Adam (Kingma and Ba 2015, algorithm 1), with bias correction.
 
+use crate::options::Moments;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -9,33 +10,16 @@ const CHUNK: usize = 1 << 14;
 /// The moments of one group of parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Adam {
-    /// Decay of the first moment.
-    pub(crate) beta1: f32,
-    /// Decay of the second moment.
-    pub(crate) beta2: f32,
-    /// Added to the root of the second moment: gradients far below it move nothing.
-    pub(crate) epsilon: f32,
+    options: Moments,
     steps: u32,
     first: Vec<f32>,
     second: Vec<f32>,
 }
 
 impl Adam {
-    /// For `len` parameters, with β 0.9 and 0.999 and ε 1e-8.
-    pub(crate) fn new(len: usize) -> Self {
-        Self {
-            beta1: 0.9,
-            beta2: 0.999,
-            epsilon: 1e-8,
-            steps: 0,
-            first: vec![0.0; len],
-            second: vec![0.0; len],
-        }
-    }
-
-    /// The same with another ε.
-    pub(crate) fn with_epsilon(self, epsilon: f32) -> Self {
-        Self { epsilon, ..self }
+    /// For `len` parameters.
+    pub(crate) fn new(len: usize, options: Moments) -> Self {
+        Self { options, steps: 0, first: vec![0.0; len], second: vec![0.0; len] }
     }
 
     /// One step against the gradient.
@@ -61,15 +45,15 @@ impl Adam {
         assert_eq!(gradient.len(), self.first.len(), "one derivative per parameter");
         self.steps += 1;
         let power = |beta: f32| f64::from(beta).powi(i32::try_from(self.steps).unwrap_or(i32::MAX));
-        let correction = (1.0 - power(self.beta2)).sqrt();
-        let scale = (correction / (1.0 - power(self.beta1))) as f32;
-        let epsilon = self.epsilon * correction as f32;
+        let Moments { beta1, beta2, epsilon } = self.options;
+        let correction = (1.0 - power(beta2)).sqrt();
+        let scale = (correction / (1.0 - power(beta1))) as f32;
+        let epsilon = epsilon * correction as f32;
         // One row's rates, repeated so that vectors of any length can be read from them.
         let length = width * (CHUNK / width).max(1);
         assert_eq!(parameters.len() % width, 0, "whole rows");
         let rates: Vec<f32> =
             (0..length.min(parameters.len())).map(|i| scale * learning_rate(i % width)).collect();
-        let (beta1, beta2) = (self.beta1, self.beta2);
         let moments = self.first.par_chunks_mut(length).zip(self.second.par_chunks_mut(length));
         let values = parameters.par_chunks_mut(length).zip(gradient.par_chunks(length));
         moments.zip(values).for_each(|((first, second), (parameters, gradient))| {
@@ -169,7 +153,7 @@ mod tests {
     #[test]
     fn steps_are_those_of_the_algorithm() {
         for epsilon in [1e-8f32, 1e-2] {
-            let mut adam = Adam::new(3).with_epsilon(epsilon);
+            let mut adam = Adam::new(3, Moments::with_epsilon(epsilon));
             let mut x = [1.0, -2.0, 0.5];
             for gradient in GRADIENTS {
                 adam.step(&mut x, &gradient.map(|g| g as f32), 0.05);
@@ -182,7 +166,7 @@ mod tests {
 
     #[test]
     fn rows_have_rates_of_their_own_and_keep_their_moments() {
-        let mut adam = Adam::new(4);
+        let mut adam = Adam::new(4, Moments::with_epsilon(1e-8));
         let mut x = [0.0; 4];
         adam.step_rows(&mut x, &[1.0; 4], 2, |place| [0.1, 0.0][place]);
         assert_eq!(x.map(|v| (v * 1e6).round()), [-100_000.0, 0.0, -100_000.0, 0.0]);

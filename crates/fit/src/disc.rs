@@ -1,6 +1,7 @@
 //! The shape of a Gaussian that covers its part of a surface: flat, as wide as the part's second moment in the tangent
 //! plane.
 
+use super::options::Cover;
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use skinsplat_core::scene::body::vertex_normals;
 
@@ -13,15 +14,10 @@ pub(super) struct Disc {
     pub(super) moment: DMat3,
 }
 
-/// The longest axis is at most this many times the shorter one in the plane.
-const LARGEST_ASPECT: f64 = 4.0;
-/// No standard deviation is smaller, metres: parts without area still need a valid Gaussian.
-const LEAST_SIGMA: f64 = 1e-5;
-
 impl Disc {
     /// Quaternion (w, x, y, z) and log standard deviations: in the tangent plane `scale` times those of the part, along
     /// the normal `thickness` times their geometric mean.
-    pub(super) fn gaussian(&self, scale: f64, thickness: f64) -> ([f32; 4], Vec3) {
+    pub(super) fn gaussian(&self, scale: f64, thickness: f64, cover: &Cover) -> ([f32; 4], Vec3) {
         let normal = self.normal.try_normalize().unwrap_or(DVec3::Z);
         let (u, v) = normal.any_orthonormal_pair();
         let moment = |a: DVec3, b: DVec3| a.dot(self.moment * b);
@@ -30,10 +26,10 @@ impl Disc {
         let spread = difference.hypot(uv);
         let angle = uv.atan2(difference) / 2.0;
         let major = u * angle.cos() + v * angle.sin();
-        let sigma = |variance: f64| (scale * variance.max(0.0).sqrt()).max(LEAST_SIGMA);
+        let sigma = |variance: f64| (scale * variance.max(0.0).sqrt()).max(cover.least_sigma);
         let long = sigma(mean + spread);
-        let short = sigma(mean - spread).max(long / LARGEST_ASPECT);
-        let thin = (thickness * (long * short).sqrt()).max(LEAST_SIGMA);
+        let short = sigma(mean - spread).max(long / cover.largest_aspect);
+        let thin = (thickness * (long * short).sqrt()).max(cover.least_sigma);
         let q = DQuat::from_mat3(&DMat3::from_cols(major, normal.cross(major), normal)).normalize();
         ([q.w, q.x, q.y, q.z].map(|c| c as f32), DVec3::new(long, short, thin).map(f64::ln).as_vec3())
     }

@@ -51,18 +51,16 @@ impl Neighbours {
     }
 }
 
-/// Steps of diffusion after the first guess.
-const DIFFUSION_STEPS: usize = 200;
-
 /// Replaces the values that are not `known` (`stride` of them per part): first from the nearest known part over the
-/// mesh, or through space for a piece of the mesh of which nothing is known; then diffused, the known values held
-/// fixed. Leaves everything as it is if nothing is known.
+/// mesh, or through space for a piece of the mesh of which nothing is known; then diffused in so many
+/// `steps`, the known values held fixed. Leaves everything as it is if nothing is known.
 pub(super) fn fill_unknown(
     values: &mut [[f32; 3]],
     stride: usize,
     known: &[bool],
     neighbours: &Neighbours,
     positions: &[DVec3],
+    steps: usize,
 ) {
     let mut source: Vec<Option<u32>> =
         known.iter().enumerate().map(|(i, &k)| k.then_some(i as u32)).collect();
@@ -90,7 +88,7 @@ pub(super) fn fill_unknown(
             values[part * stride + k] = values[from * stride + k];
         }
     }
-    diffuse(values, stride, &unknown, neighbours);
+    diffuse(values, stride, &unknown, neighbours, steps);
 }
 
 fn nearest(seeds: &[u32], positions: &[DVec3], position: DVec3) -> u32 {
@@ -100,8 +98,8 @@ fn nearest(seeds: &[u32], positions: &[DVec3], position: DVec3) -> u32 {
 }
 
 /// Gauss-Seidel steps of Laplace's equation at the unknown parts, in index order.
-fn diffuse(values: &mut [[f32; 3]], stride: usize, unknown: &[usize], neighbours: &Neighbours) {
-    for _ in 0..DIFFUSION_STEPS {
+fn diffuse(values: &mut [[f32; 3]], stride: usize, unknown: &[usize], neighbours: &Neighbours, steps: usize) {
+    for _ in 0..steps {
         for &part in unknown {
             let around = neighbours.of(part);
             if around.is_empty() {
@@ -137,7 +135,7 @@ mod tests {
             values[i] = [v, -v, 1.0];
         }
         let positions: Vec<DVec3> = (0..13).map(|i| DVec3::X * f64::from(i)).collect();
-        fill_unknown(&mut values, 1, &known, &neighbours, &positions);
+        fill_unknown(&mut values, 1, &known, &neighbours, &positions, 200);
         for (i, value) in values[..10].iter().enumerate() {
             // the linear function is the harmonic one on this strip
             assert!(

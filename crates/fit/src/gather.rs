@@ -2,6 +2,7 @@
 //! squares, one small system per part, accumulated frame by frame.
 
 use super::Error;
+use super::options::Sighting;
 use super::sighting::{Frame, Observation, SurfacePoint};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -9,9 +10,6 @@ use skinsplat_core::math::rotation::nearest_rotation;
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::{PosedBody, SkinWeights};
 use skinsplat_data::sequence::Sequence;
-
-/// Observations this far from the consensus of the others, in colour, count a quarter.
-pub(super) const ROBUST_SCALE: f64 = 0.1;
 
 /// Frames that are loaded at a time.
 const BATCH: usize = 8;
@@ -83,27 +81,32 @@ pub(super) struct Gathering<'a> {
     pub(super) origin: f64,
     /// Observations count less the farther they are from these colours: `1 / (1 + (distance / scale)²)²`.
     pub(super) robust: Option<(&'a Colours, f64)>,
+    /// Which sights count.
+    pub(super) sighting: &'a Sighting,
 }
 
-impl Gathering<'_> {
+impl<'a> Gathering<'a> {
     /// Plain mean colours.
-    pub(super) const MEAN: Self = Self { degree: 0, smoothness: 0.0, origin: 0.5, robust: None };
+    pub(super) fn mean(sighting: &'a Sighting) -> Self {
+        Self { degree: 0, smoothness: 0.0, origin: 0.5, robust: None, sighting }
+    }
 }
 
 /// The colours of a sequence's true images: the mean over the frames that show a part, then again with the outliers
-/// weighed down, in SH of `degree`.
+/// (`robust_scale` away in colour count a quarter) weighed down, in SH of `degree`.
 pub(super) fn consensus(
     sequence: &Sequence,
+    sighting: &Sighting,
+    robust_scale: f64,
     parts: &Parts,
-    degree: usize,
-    smoothness: f64,
+    (degree, smoothness): (usize, f64),
 ) -> Result<Colours, Error> {
     let truth = |gathering| {
         let show = |frame: &Frame<'_>, (): &(), point: &SurfacePoint| frame.observe(point, &frame.truth.rgb);
         gather(sequence, parts, gathering, |_| Ok(()), show)
     };
-    let mean = truth(Gathering::MEAN)?;
-    truth(Gathering { degree, smoothness, robust: Some((&mean, ROBUST_SCALE)), ..Gathering::MEAN })
+    let mean = truth(Gathering::mean(sighting))?;
+    truth(Gathering { degree, smoothness, robust: Some((&mean, robust_scale)), ..Gathering::mean(sighting) })
 }
 
 /// Fits every part to what the frames show of it: `prepare` makes of each frame what `observe` then reads at every
@@ -119,7 +122,7 @@ pub(super) fn gather<S: Send + Sync>(
     let frames: Vec<usize> = (0..sequence.frames.len()).collect();
     for batch in frames.chunks(BATCH) {
         let load = |&index: &usize| -> Result<(Frame<'_>, S), Error> {
-            let frame = Frame::load(sequence, index)?;
+            let frame = Frame::load(sequence, index, gathering.sighting)?;
             let shown = prepare(&frame)?;
             Ok((frame, shown))
         };

@@ -1,4 +1,7 @@
-//! Avatars from a body and its training frames. No optimiser yet: what can be gathered from the frames directly.
+#![doc = include_str!("../README.md")]
+//!
+//! Avatars from a body and its training frames: what can be gathered from the frames directly, and what an optimiser makes
+//! of it.
 //!
 //! [`clothing`] moves the body's surface onto the outlines in the masks, [`surface`] makes Gaussians on it, [`texture`] a
 //! texture for the body's own atlas. All three ask the same two questions: where is a point of the surface seen in each
@@ -13,6 +16,7 @@ mod fill;
 mod frame_order;
 mod gather;
 mod loss;
+pub mod options;
 pub mod recipe;
 mod room;
 pub mod shape;

@@ -5,12 +5,9 @@ use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// A layer is looked for in a cone around the inward normal: at most this far aside, relative to its depth.
-const CONE: f64 = 0.7;
-
-/// For every disc, the depth below it of the nearest other disc in a cone around its inward normal, metres; `reach` if
-/// there is none within that.
-pub(super) fn room_below(discs: &[Disc], reach: f64) -> Vec<f64> {
+/// For every disc, the depth below it of the nearest other disc in a cone around its inward normal (at most `cone` times as far
+/// aside as below), metres; `reach` if there is none within that.
+pub(super) fn room_below(discs: &[Disc], reach: f64, cone: f64) -> Vec<f64> {
     if reach <= 0.0 {
         return vec![0.0; discs.len()];
     }
@@ -27,7 +24,7 @@ pub(super) fn room_below(discs: &[Disc], reach: f64) -> Vec<f64> {
             let offset = discs[i as usize].centre - disc.centre;
             let depth = -offset.dot(disc.normal);
             let aside = (offset + disc.normal * depth).length();
-            (depth > 0.0 && aside <= CONE * depth).then_some(depth)
+            (depth > 0.0 && aside <= cone * depth).then_some(depth)
         };
         near.filter_map(depth).fold(reach, f64::min)
     };
@@ -49,8 +46,8 @@ mod tests {
             disc(DVec3::new(0.009, 0.0, -0.001), DVec3::Z),
             disc(DVec3::new(5.0, 0.0, 0.0), DVec3::X),
         ];
-        let room = room_below(&discs, 0.02);
+        let room = room_below(&discs, 0.02, 0.7);
         assert_eq!((room[0], room[2], room[4]), (0.004, 0.002, 0.02));
-        assert_eq!(room_below(&discs, 0.0), vec![0.0; 5]);
+        assert_eq!(room_below(&discs, 0.0, 0.7), vec![0.0; 5]);
     }
 }

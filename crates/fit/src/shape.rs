@@ -12,6 +12,7 @@ mod views;
 
 use super::adam::Adam;
 use super::frame_order::shuffled;
+use super::options::{Clothing, Moments, NOT_NEGATIVE, POSITIVE, SHARE, Sighting, within};
 use super::silhouette::Blur;
 use super::{Error, clothing, training};
 use diffusion::Diffusion;
@@ -32,13 +33,27 @@ use views::{Cache, View};
 pub struct ShapeFit {
     /// Steps.
     pub iterations: usize,
+    /// Of the order of the frames.
+    pub seed: u64,
+    /// The fit starts from the offsets that this finds; from the body for no rounds.
+    pub clothing: Clothing,
+    /// What counts as hidden for `clothing`.
+    pub sighting: Sighting,
+    /// What is minimised, and how.
+    pub options: ShapeOptions,
+}
+
+/// What the fit of a shape minimises, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ShapeOptions {
     /// Frames per step.
     pub batch: usize,
     /// Adam's step at the start, metres; falls to zero along a half cosine.
     pub learning_rate: f64,
-    /// Adam's epsilon, in units of the objective per metre: vertices that hardly matter to it hardly move. With a smaller
-    /// one, those that no outline visits follow the last digits of the regularisers at full pace.
-    pub epsilon: f64,
+    /// Adam's moments, their ε in units of the objective per metre: vertices that hardly matter to it hardly move. With a
+    /// smaller one, those that no outline visits follow the last digits of the regularisers at full pace.
+    pub moments: Moments,
     /// Weight of one minus the intersection over union.
     pub iou: f64,
     /// Weight of the variance of edge lengths relative to the rest mesh.
@@ -53,19 +68,34 @@ pub struct ShapeFit {
     pub softness: f64,
     /// Frames are reduced to at most so many pixels on their longer side.
     pub longest_side: u32,
-    /// The fit starts from offsets found in so many rounds of [`clothing::offsets_from_outlines`]; zero: from the body.
-    pub outline_rounds: usize,
-    /// Of the order of the frames.
-    pub seed: u64,
+    /// The filter reaches so many standard deviations.
+    pub filter_reach: f64,
+    /// Pixels around the mask and the body at rest that are looked at beside what the filter needs.
+    pub margin: usize,
+    /// A mask of less area than this is empty, pixels.
+    pub least_area: f64,
+    /// A mask that covers more than this part of its image has no outline.
+    pub most_covered: f64,
 }
 
 impl Default for ShapeFit {
     fn default() -> Self {
         Self {
             iterations: 150,
+            seed: 0,
+            clothing: Clothing::default(),
+            sighting: Sighting::default(),
+            options: ShapeOptions::default(),
+        }
+    }
+}
+
+impl Default for ShapeOptions {
+    fn default() -> Self {
+        Self {
             batch: 4,
             learning_rate: 1e-3,
-            epsilon: 1e-4,
+            moments: Moments::with_epsilon(1e-4),
             iou: 1.0,
             edge_length: 1e-3,
             normal_consistency: 2e-3,
@@ -73,8 +103,10 @@ impl Default for ShapeFit {
             smoothing: 8,
             softness: 1.0,
             longest_side: 512,
-            outline_rounds: 2,
-            seed: 0,
+            filter_reach: 3.0,
+            margin: 8,
+            least_area: 1.0,
+            most_covered: 0.999,
         }
     }
 }
@@ -133,50 +165,45 @@ pub fn fit_shape(
     settings: &ShapeFit,
     progress: &mut dyn FnMut(ShapeProgress) -> ControlFlow<()>,
 ) -> Result<FittedShape, Error> {
-    settings.validate()?;
-    let training = training::prepared(sequence, usize::MAX)?.reduced(settings.longest_side);
-    let start = clothing::offsets_from_outlines(&training, settings.outline_rounds)?;
+    let ShapeFit { clothing, sighting, options, .. } = settings;
+    sighting.check("sighting")?;
+    options.check("")?;
+    let training = training::prepared(sequence, usize::MAX)?.reduced(options.longest_side);
+    let start = clothing::offsets_from_outlines(&training, clothing, sighting)?;
     let (surface, start) = Surface::new(&training.body, &start).map_err(Error::scene(&training))?;
     Fit::new(&training, settings, &surface, start).run(progress)
 }
 
-impl ShapeFit {
-    fn validate(&self) -> Result<(), Error> {
-        let weights = [
-            ("learning_rate", self.learning_rate),
-            ("epsilon", self.epsilon),
-            ("iou", self.iou),
-            ("edge_length", self.edge_length),
-            ("normal_consistency", self.normal_consistency),
-            ("laplacian", self.laplacian),
-            ("softness", self.softness),
+impl ShapeOptions {
+    /// Checks every number; fields are named within `section`.
+    pub(crate) fn check(&self, section: &str) -> Result<(), Error> {
+        let bounds = [
+            ("batch", self.batch as f64, 1.0..=f64::MAX),
+            ("learning_rate", self.learning_rate, NOT_NEGATIVE),
+            ("iou", self.iou, NOT_NEGATIVE),
+            ("edge_length", self.edge_length, NOT_NEGATIVE),
+            ("normal_consistency", self.normal_consistency, NOT_NEGATIVE),
+            ("laplacian", self.laplacian, NOT_NEGATIVE),
+            ("smoothing", self.smoothing as f64, 0.0..=1e6),
+            // wider filters leave nothing of a silhouette
+            ("softness", self.softness, 0.0..=32.0),
+            ("filter_reach", self.filter_reach, 0.0..=16.0),
+            ("longest_side", f64::from(self.longest_side), 1.0..=f64::MAX),
+            ("margin", self.margin as f64, 0.0..=1e6),
+            ("least_area", self.least_area, POSITIVE),
+            ("most_covered", self.most_covered, SHARE),
         ];
-        for (field, value) in weights {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(Error::invalid(field, value.to_string(), "a finite number, at least 0"));
-            }
-        }
-        if self.softness > MOST_SOFTNESS {
-            let expected = format!("at most {MOST_SOFTNESS} pixels");
-            return Err(Error::invalid("softness", self.softness.to_string(), expected));
-        }
-        if self.batch == 0 {
-            return Err(Error::invalid("batch", "0", "at least 1"));
-        }
-        if self.longest_side == 0 {
-            return Err(Error::invalid("longest_side", "0", "at least 1"));
-        }
-        Ok(())
-    }
-
-    fn rate(&self, iteration: usize) -> f32 {
-        let done = iteration as f64 / self.iterations as f64;
-        (self.learning_rate * 0.5 * (1.0 + (std::f64::consts::PI * done).cos())) as f32
+        within(section, &bounds)?;
+        self.moments.check(if section.is_empty() { "moments" } else { section })
     }
 }
 
-/// Wider filters leave nothing of a silhouette.
-const MOST_SOFTNESS: f64 = 32.0;
+impl ShapeFit {
+    fn rate(&self, iteration: usize) -> f32 {
+        let done = iteration as f64 / self.iterations as f64;
+        (self.options.learning_rate * 0.5 * (1.0 + (std::f64::consts::PI * done).cos())) as f32
+    }
+}
 
 struct Fit<'a> {
     sequence: &'a Sequence,
@@ -201,7 +228,7 @@ impl<'a> Fit<'a> {
             sequence,
             settings,
             surface,
-            blur: Blur::new(settings.softness),
+            blur: Blur::new(settings.options.softness, settings.options.filter_reach),
             start,
             cache: Cache::new(frames),
             queue: Vec::new(),
@@ -217,11 +244,10 @@ impl<'a> Fit<'a> {
     ) -> Result<FittedShape, Error> {
         let Surface { body, normals, topology } = self.surface;
         let regularity = Regularity::new(topology, &body.vertices, normals);
-        let diffusion = Diffusion::new(body.vertices.len(), &body.faces, self.settings.smoothing);
-        let weights = self.settings.weights();
+        let diffusion = Diffusion::new(body.vertices.len(), &body.faces, self.settings.options.smoothing);
+        let weights = self.settings.options.weights();
         let mut parameters = vec![0.0f32; self.start.len()];
-        let mut adam = Adam::new(parameters.len());
-        adam.epsilon = self.settings.epsilon as f32;
+        let mut adam = Adam::new(parameters.len(), self.settings.options.moments);
         let mut curve = Vec::with_capacity(self.settings.iterations);
         let mut ended = Ended::Finished;
         let mut offsets = self.offsets(&diffusion, &parameters);
@@ -267,7 +293,7 @@ impl<'a> Fit<'a> {
             if self.queue.is_empty() {
                 self.fill_queue()?;
             }
-            let batches = self.queue.len().div_ceil(self.settings.batch);
+            let batches = self.queue.len().div_ceil(self.settings.options.batch);
             let size = self.queue.len().div_ceil(batches);
             let next = self.queue.split_off(self.queue.len() - size);
             let batch = self.loaded(next)?;
@@ -295,7 +321,15 @@ impl<'a> Fit<'a> {
         let start: Vec<f64> = self.start.iter().map(|&o| f64::from(o)).collect();
         let load = |&frame: &usize| match self.cache.get(frame) {
             Some(view) => Ok(Ok(view)),
-            None => Ok(View::load(self.sequence, frame, self.surface, &start, &self.blur)?.map(Arc::new)),
+            None => Ok(View::load(
+                self.sequence,
+                frame,
+                self.surface,
+                &start,
+                &self.blur,
+                &self.settings.options,
+            )?
+            .map(Arc::new)),
         };
         let views: Vec<Result<Arc<View>, _>> = frames.par_iter().map(load).collect::<Result<_, Error>>()?;
         let mut usable = Vec::with_capacity(frames.len());
@@ -337,10 +371,10 @@ impl<'a> Fit<'a> {
                 return Err(self.sequence.frames[*frame].name.clone());
             }
             mean += iou * share;
-            let weight = -self.settings.iou * share;
+            let weight = -self.settings.options.iou * share;
             gradient.iter_mut().zip(by_offset).for_each(|(sum, g)| *sum += weight * g);
         }
-        loss += self.settings.iou * (1.0 - mean);
+        loss += self.settings.options.iou * (1.0 - mean);
         Ok(Step { loss, iou: mean, gradient })
     }
 }
@@ -355,7 +389,7 @@ fn is_finite(value: f64, gradient: &[f64]) -> bool {
     value.is_finite() && gradient.iter().all(|g| g.is_finite())
 }
 
-impl ShapeFit {
+impl ShapeOptions {
     fn weights(&self) -> Weights {
         Weights {
             edge_length: self.edge_length,

@@ -1,6 +1,7 @@
 //! Where points of a body's surface are seen in a frame, and how far each sight can be trusted.
 
 use super::Error;
+use super::options::Sighting;
 use glam::{DVec2, DVec3, Vec3};
 use skinsplat_core::scene::{Camera, Image, Mask, PosedBody};
 use skinsplat_data::sequence::{Sequence, Truth};
@@ -30,25 +31,6 @@ impl Observation {
     }
 }
 
-/// Weight of a sight: cosine of the angle between normal and view, to this power. A frontal sight has more pixels per
-/// area and less blur.
-const FACING_POWER: i32 = 2;
-/// Surfaces seen at a smaller cosine are not looked at.
-const LEAST_FACING: f64 = 0.1;
-/// The depth buffer has this many samples per pixel side.
-const OVERSAMPLING: u32 = 2;
-/// Points within this many samples of an edge of the depth buffer are not trusted: the image filter mixes both sides.
-const EDGE_RADIUS: isize = 3;
-/// How far behind the depth buffer a visible point may lie, metres, beside what the slope explains.
-const DEPTH_TOLERANCE: f64 = 0.003;
-/// Factor of a sight beside an occluder: it shows the occluder's colour.
-const BESIDE_OCCLUDER: f64 = 1e-4;
-/// Factor of a sight beside the surface's own outline or over a part that is not fully covered.
-const BESIDE_OUTLINE: f64 = 1e-2;
-/// Coverage from which a pixel counts as fully covered, and below which it says nothing.
-const FULL_COVERAGE: f32 = 0.99;
-const LEAST_COVERAGE: f32 = 0.5;
-
 /// A frame with its truth and the posed surface in front of its camera.
 pub(super) struct Frame<'a> {
     pub(super) camera: &'a Camera,
@@ -56,38 +38,41 @@ pub(super) struct Frame<'a> {
     pub(super) truth: Truth,
     pub(super) depth: VisibleFaces,
     pub(super) eye: DVec3,
+    sighting: &'a Sighting,
 }
 
 impl<'a> Frame<'a> {
     /// Loads and poses frame `index` of a sequence.
-    pub(super) fn load(sequence: &'a Sequence, index: usize) -> Result<Self, Error> {
+    pub(super) fn load(sequence: &'a Sequence, index: usize, sighting: &'a Sighting) -> Result<Self, Error> {
         let truth = sequence.truth(index)?;
         let frame = &sequence.frames[index];
         let (pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
         let in_scene = Error::scene(sequence);
         let body = PosedBody::new(&sequence.body, pose).map_err(&in_scene)?;
-        let fine = camera.resized(camera.width * OVERSAMPLING, camera.height * OVERSAMPLING);
+        let finer = sighting.oversampling;
+        let fine = camera.resized(camera.width * finer, camera.height * finer);
         let mesh = Mesh::new(&body.mesh().vertices, &sequence.body.faces).map_err(&in_scene)?;
         let depth = visible_faces(&mesh, &fine).map_err(&in_scene)?;
-        Ok(Self { camera, truth, depth, eye: camera.position(), body })
+        Ok(Self { camera, truth, depth, eye: camera.position(), body, sighting })
     }
 
     /// What `image`, of the frame's size, shows at a surface point.
     pub(super) fn observe(&self, point: &SurfacePoint, image: &Image) -> Observation {
+        let options = self.sighting;
         let (position, normal) = self.posed(point);
         let unseen = Observation::unseen(position);
         let facing = normal.dot((self.eye - position.as_dvec3()).normalize_or_zero());
-        if facing < LEAST_FACING {
+        if facing < options.least_facing {
             return unseen;
         }
         let Some((pixel, depth)) = self.camera.project(position.as_dvec3()) else { return unseen };
         let Some(trust) = self.trust(pixel, depth, facing) else { return unseen };
         let (colour, coverage) = bilinear(image, &self.truth.alpha, pixel);
-        if coverage < LEAST_COVERAGE {
+        if coverage < options.least_coverage {
             return unseen;
         }
-        let covered = if coverage < FULL_COVERAGE { BESIDE_OUTLINE } else { 1.0 };
-        let weight = facing.powi(FACING_POWER) * trust * covered;
+        let covered = if coverage < options.full_coverage { options.beside_outline } else { 1.0 };
+        let weight = facing.powi(options.facing_power) * trust * covered;
         Observation { colour, weight: weight as f32, position }
     }
 
@@ -103,30 +88,33 @@ impl<'a> Frame<'a> {
 
     /// Looks at the depth buffer around a point: `None` if it is hidden, less than one beside an edge.
     fn trust(&self, pixel: DVec2, depth: f64, facing: f64) -> Option<f64> {
-        let sample = pixel * f64::from(OVERSAMPLING);
+        let options = self.sighting;
+        let finer = f64::from(options.oversampling);
+        let sample = pixel * finer;
         let (width, height) = (self.depth.width() as isize, self.depth.height() as isize);
         if !(sample.x >= 0.0 && sample.y >= 0.0 && sample.x < width as f64 && sample.y < height as f64) {
             return None;
         }
         // depth changes by this much per sample along the steepest direction of the surface
         let tangent = (1.0 - facing * facing).max(0.0).sqrt() / facing;
-        let slope = depth / (self.camera.fx.min(self.camera.fy) * f64::from(OVERSAMPLING)) * tangent;
+        let slope = depth / (self.camera.fx.min(self.camera.fy) * finer) * tangent;
         let (x, y) = (sample.x as isize, sample.y as isize);
-        if depth > f64::from(self.depth.depth(x as usize, y as usize)) + DEPTH_TOLERANCE + slope {
+        if depth > f64::from(self.depth.depth(x as usize, y as usize)) + options.depth_tolerance + slope {
             return None;
         }
-        let reach = EDGE_RADIUS as f64 + 1.0;
-        let tolerance = 3.0 * DEPTH_TOLERANCE + reach * std::f64::consts::SQRT_2 * slope;
+        let radius = options.edge_radius as isize;
+        let reach = radius as f64 + 1.0;
+        let tolerance = 3.0 * options.depth_tolerance + reach * std::f64::consts::SQRT_2 * slope;
         let (mut nearest, mut farthest) = (f64::INFINITY, 0.0f64);
-        for row in (y - EDGE_RADIUS).max(0)..=(y + EDGE_RADIUS).min(height - 1) {
-            for column in (x - EDGE_RADIUS).max(0)..=(x + EDGE_RADIUS).min(width - 1) {
+        for row in (y - radius).max(0)..=(y + radius).min(height - 1) {
+            for column in (x - radius).max(0)..=(x + radius).min(width - 1) {
                 let z = f64::from(self.depth.depth(column as usize, row as usize));
                 nearest = nearest.min(z);
                 farthest = farthest.max(z);
             }
         }
-        let occluder = if nearest < depth - tolerance { BESIDE_OCCLUDER } else { 1.0 };
-        let outline = if farthest > depth + tolerance { BESIDE_OUTLINE } else { 1.0 };
+        let occluder = if nearest < depth - tolerance { options.beside_occluder } else { 1.0 };
+        let outline = if farthest > depth + tolerance { options.beside_outline } else { 1.0 };
         Some(occluder * outline)
     }
 }

@@ -3,7 +3,8 @@
 
 use super::disc::{self, Disc};
 use super::fill::{Neighbours, fill_unknown};
-use super::gather::{Colours, Gathering, Parts, ROBUST_SCALE, consensus, gather};
+use super::gather::{Colours, Gathering, Parts, consensus, gather};
+use super::options::{Clothing, Cover, Sighting};
 use super::room::room_below;
 use super::sighting::{Frame, SurfacePoint};
 use super::tessellation::Tessellation;
@@ -42,13 +43,15 @@ pub struct SurfaceInit {
     pub sh_degree: usize,
     /// Pull of degrees 1 to 3 towards zero, relative to the observations.
     pub smoothness: f64,
-    /// How often the body's outline is brought closer to that of the masks before anything else: clothing and hair are
-    /// not part of a body model.
-    pub outline_rounds: usize,
-    /// At most so many training frames are looked at, evenly spread over the sequence.
-    pub most_frames: usize,
     /// How often the colours are corrected by what is missing in the rendered training frames.
     pub refinements: usize,
+    /// How the body's outline is brought closer to that of the masks before anything else: clothing and hair are not part
+    /// of a body model.
+    pub clothing: Clothing,
+    /// Which sights of the surface count.
+    pub sighting: Sighting,
+    /// How the surface is covered.
+    pub cover: Cover,
 }
 
 impl Default for SurfaceInit {
@@ -63,9 +66,10 @@ impl Default for SurfaceInit {
             inset: 1.2,
             sh_degree: 0,
             smoothness: 0.1,
-            most_frames: 64,
-            outline_rounds: 2,
             refinements: 1,
+            clothing: Clothing::default(),
+            sighting: Sighting::default(),
+            cover: Cover::default(),
         }
     }
 }
@@ -76,19 +80,28 @@ impl Default for SurfaceInit {
 /// A setting out of range, a sequence without frames, a body that breaks an invariant, a frame that cannot be read.
 pub fn surface_init(sequence: &Sequence, init: &SurfaceInit) -> Result<Avatar, Error> {
     init.validate()?;
-    let training = training::prepared(sequence, init.most_frames)?;
-    let dressed = clothing::dressed(&training, init.outline_rounds)?;
+    let training = training::prepared(sequence, init.cover.most_frames)?;
+    let dressed = clothing::dressed(&training, &init.clothing, &init.sighting)?;
     let (layout, mut colours) = coloured(&dressed, init)?;
     refine(&dressed, &layout, init, &mut colours)?;
     Ok(layout.avatar(init, &colours, &sequence.body))
 }
 
 /// One colour per vertex of a sequence's body, also where no frame shows it; grey for vertices without a face.
-pub(super) fn vertex_colours(sequence: &Sequence) -> Result<Vec<[f32; 3]>, Error> {
-    let (_, colours) = coloured(
-        sequence,
-        &SurfaceInit { placement: Placement::Vertices, sh_degree: 0, ..Default::default() },
-    )?;
+pub(super) fn vertex_colours(
+    sequence: &Sequence,
+    sighting: &Sighting,
+    cover: &Cover,
+) -> Result<Vec<[f32; 3]>, Error> {
+    let (sighting, cover) = (sighting.clone(), cover.clone());
+    let init = SurfaceInit {
+        placement: Placement::Vertices,
+        sh_degree: 0,
+        sighting,
+        cover,
+        ..SurfaceInit::default()
+    };
+    let (_, colours) = coloured(sequence, &init)?;
     let mut of_body = vec![[0.5; 3]; sequence.body.vertices.len()];
     for (vertex, coefficients) in
         tessellation::vertices_with_faces(&sequence.body).into_iter().zip(&colours.coefficients)
@@ -100,11 +113,18 @@ pub(super) fn vertex_colours(sequence: &Sequence) -> Result<Vec<[f32; 3]>, Error
 
 fn coloured(sequence: &Sequence, init: &SurfaceInit) -> Result<(Layout, Colours), Error> {
     let layout = Layout::new(sequence, init).map_err(Error::scene(sequence))?;
-    let mut colours = consensus(sequence, &layout.parts, init.sh_degree, init.smoothness)?;
+    let mut colours = consensus(
+        sequence,
+        &init.sighting,
+        init.cover.robust_scale,
+        &layout.parts,
+        (init.sh_degree, init.smoothness),
+    )?;
     let known: Vec<bool> = colours.confidence.iter().map(|&c| c > 0.0).collect();
     let centres: Vec<DVec3> = layout.discs.iter().map(|d| d.centre).collect();
     let stride = sh::count(init.sh_degree);
-    fill_unknown(&mut colours.coefficients, stride, &known, &layout.neighbours, &centres);
+    let steps = init.cover.diffusion_steps;
+    fill_unknown(&mut colours.coefficients, stride, &known, &layout.neighbours, &centres, steps);
     Ok((layout, colours))
 }
 
@@ -135,7 +155,9 @@ impl SurfaceInit {
         if self.sh_degree > sh::MAX_DEGREE {
             return Err(Error::invalid("sh_degree", self.sh_degree.to_string(), "0 to 3"));
         }
-        Ok(())
+        self.clothing.check("clothing")?;
+        self.sighting.check("sighting")?;
+        self.cover.check("cover")
     }
 }
 
@@ -169,7 +191,8 @@ fn refine(
             degree: init.sh_degree,
             smoothness: init.smoothness,
             origin: 0.0,
-            robust: Some((&none, ROBUST_SCALE)),
+            robust: Some((&none, init.cover.robust_scale)),
+            sighting: &init.sighting,
         };
         colours
             .add(&gather(sequence, &layout.parts, gathering, residual, |f, image, p| f.observe(p, image))?);
@@ -196,7 +219,7 @@ struct Layout {
 impl Layout {
     fn new(sequence: &Sequence, init: &SurfaceInit) -> Result<Self, SceneError> {
         let body = &*sequence.body;
-        let mesh = Tessellation::new(body, init.longest_edge);
+        let mesh = Tessellation::new(body, init.longest_edge, init.cover.most_divisions)?;
         let (vertices, faces) = (&mesh.vertices, &mesh.faces);
         let points: Vec<SurfacePoint> =
             mesh.corners.iter().flat_map(|corners| POINTS.map(|weights| corners.at(weights))).collect();
@@ -226,17 +249,18 @@ impl Layout {
 
     /// How far each Gaussian sits below its disc, metres.
     fn insets(&self, init: &SurfaceInit, colours: &Colours) -> Vec<f64> {
-        let wanted = init.inset * self.pixel;
-        let room = room_below(&self.discs, wanted.abs() / SHARE_OF_ROOM);
+        let (wanted, share) = (init.inset * self.pixel, init.cover.share_of_room);
+        let room = room_below(&self.discs, wanted.abs() / share, init.cover.room_cone);
         let inset = |(room, &seen): (f64, &f32)| {
-            if seen > 0.0 { wanted.signum() * wanted.abs().min(SHARE_OF_ROOM * room) } else { 0.0 }
+            if seen > 0.0 { wanted.signum() * wanted.abs().min(share * room) } else { 0.0 }
         };
         room.into_iter().zip(&colours.confidence).map(inset).collect()
     }
 
     /// The avatar, bound to a body whose surface may lie below the one on which the Gaussians sit.
     fn avatar(&self, init: &SurfaceInit, colours: &Colours, body: &RestBody) -> Avatar {
-        let shapes: Vec<_> = self.discs.iter().map(|d| d.gaussian(init.scale, init.thickness)).collect();
+        let shapes: Vec<_> =
+            self.discs.iter().map(|d| d.gaussian(init.scale, init.thickness, &init.cover)).collect();
         let means: Vec<DVec3> = self
             .discs
             .iter()
@@ -263,10 +287,6 @@ impl Layout {
         Avatar { gaussians, binding }
     }
 }
-
-/// Gaussians sink by at most this share of the room below them: they must not come out on the other side of a lip or an
-/// ear.
-const SHARE_OF_ROOM: f64 = 0.4;
 
 /// How far points lie above their sites on a body, along the interpolated unit vertex normal, metres.
 fn heights(body: &RestBody, sites: &[SurfacePoint], points: &[DVec3]) -> Vec<f32> {

@@ -2,7 +2,7 @@
 
 use super::sighting::SurfacePoint;
 use glam::DVec3;
-use skinsplat_core::scene::RestBody;
+use skinsplat_core::scene::{RestBody, SceneError};
 use std::collections::BTreeMap;
 
 /// A triangulation of a body's surface, at least as fine as the body's own, that knows where on the body it lies.
@@ -72,36 +72,42 @@ impl Middles {
     }
 }
 
-/// No face is divided more often: 4^8 parts.
-const MOST_ROUNDS: usize = 8;
-/// Division stops here, whatever the edges.
+/// No surface is divided into more faces: about 2 GB with what is gathered for them.
 const MOST_FACES: usize = 4_000_000;
 
 impl Tessellation {
-    /// Halves every edge longer than `longest_edge` metres, again and again. Edges are shared: neighbouring faces divide
-    /// them alike, so the result is as closed as the body.
-    pub(super) fn new(body: &RestBody, longest_edge: f64) -> Self {
+    /// The body's own mesh, undivided.
+    pub(super) fn of(body: &RestBody) -> Self {
         let whole = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let used = vertices_with_faces(body);
         let mut index = vec![0; body.vertices.len()];
         for (new, &old) in used.iter().enumerate() {
             index[old] = new as u32;
         }
-        let mut mesh = Self {
+        Self {
             vertices: used.iter().map(|&i| body.vertices[i]).collect(),
             faces: body.faces.iter().map(|face| face.map(|i| index[i as usize])).collect(),
             corners: (0..body.faces.len() as u32).map(|face| Corners { face, barycentric: whole }).collect(),
-        };
-        for _ in 0..MOST_ROUNDS {
-            if !mesh.halve_edges(longest_edge) || mesh.faces.len() > MOST_FACES {
+        }
+    }
+
+    /// Halves every edge longer than `longest_edge` metres, again and again, at most `most_divisions` times. Edges are
+    /// shared: neighbouring faces divide them alike, so the result is as closed as the body.
+    ///
+    /// # Errors
+    /// More than four million faces, found before they are made.
+    pub(super) fn new(body: &RestBody, longest_edge: f64, most_divisions: u32) -> Result<Self, SceneError> {
+        let mut mesh = Self::of(body);
+        for _ in 0..most_divisions {
+            if !mesh.halve_edges(longest_edge)? {
                 break;
             }
         }
-        mesh
+        Ok(mesh)
     }
 
     /// One round; false if no edge was too long.
-    fn halve_edges(&mut self, longest_edge: f64) -> bool {
+    fn halve_edges(&mut self, longest_edge: f64) -> Result<bool, SceneError> {
         let mut middles = Middles::after(self.vertices.len());
         for &face in &self.faces {
             for (a, b) in sides(face) {
@@ -112,7 +118,15 @@ impl Tessellation {
             }
         }
         if middles.edges.is_empty() {
-            return false;
+            return Ok(false);
+        }
+        let cuts =
+            |face: &[u32; 3]| sides(*face).iter().filter(|&&(a, b)| middles.known(a, b).is_some()).count();
+        let count = self.faces.len() + self.faces.iter().map(cuts).sum::<usize>();
+        if count > MOST_FACES {
+            let problem = format!("{count} faces or more, for edges of at most {longest_edge} m");
+            let expected = format!("at most {MOST_FACES}: a body in metres, or longer edges");
+            return Err(SceneError::new("body.faces", problem, expected));
         }
         let middle = |&[a, b]: &[u32; 2]| (self.vertices[a as usize] + self.vertices[b as usize]) / 2.0;
         let new: Vec<DVec3> = middles.edges.iter().map(middle).collect();
@@ -121,7 +135,7 @@ impl Tessellation {
         for (face, corners) in old_faces.into_iter().zip(old_corners) {
             self.divide(face, corners, sides(face).map(|(a, b)| middles.known(a, b)));
         }
-        true
+        Ok(true)
     }
 
     /// Adds the parts of a face, given the new vertices in the middle of its edges 01, 12 and 20.
@@ -216,7 +230,7 @@ mod tests {
     fn it_stays_closed_keeps_every_area_and_has_no_long_edge() {
         let body = tetrahedron();
         for longest in [f64::INFINITY, 2.0, 1.1, 0.7, 0.2] {
-            let mesh = Tessellation::new(&body, longest);
+            let mesh = Tessellation::new(&body, longest, 8).unwrap();
             let mut areas = vec![DVec3::ZERO; body.faces.len()];
             let mut sides = BTreeMap::new();
             for (face, corners) in mesh.faces.iter().zip(&mesh.corners) {
@@ -238,9 +252,16 @@ mod tests {
     }
 
     #[test]
+    fn too_many_faces_are_refused_before_they_are_made() {
+        let error = Tessellation::new(&tetrahedron(), 1e-6, 16).err().expect("refused");
+        assert_eq!(error.field, "body.faces");
+        assert!(error.problem.contains("for edges of at most 0.000001 m"), "{error}");
+    }
+
+    #[test]
     fn sites_lie_where_the_vertices_and_centroids_are() {
         let body = tetrahedron();
-        let mesh = Tessellation::new(&body, 0.4);
+        let mesh = Tessellation::new(&body, 0.4, 8).unwrap();
         let place = |site: &SurfacePoint| -> DVec3 {
             let corners = body.faces[site.face as usize].map(|i| body.vertices[i as usize]);
             corners.iter().zip(site.barycentric).map(|(&v, b)| v * f64::from(b)).sum()

@@ -1,6 +1,7 @@
 //! A textured mesh as an avatar: the texture is gathered from the training frames, the triangle rasterizer draws it.
 
 use super::gather::{Parts, consensus};
+use super::options::{Clothing, Cover, POSITIVE, Sighting, within};
 use super::sighting::SurfacePoint;
 use super::surface;
 use super::{Error, clothing, training};
@@ -78,28 +79,35 @@ pub const SAMPLES: usize = 4;
 /// The largest side of a texture, texels.
 pub const MAX_SIZE: u32 = 8192;
 
-/// Observations of a texel count against the colour spread from its surroundings, which counts as much as one frontal
-/// observation in so many.
-const PRIOR_WEIGHT: f32 = 0.02;
-
-/// Texels around each chart that repeat its border, so that interpolation never reads an empty texel.
-const GUTTER: usize = 8;
-
 /// How a texture is gathered.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TextureInit {
     /// Texels along a side.
     pub size: u32,
-    /// How often the body's outline is brought closer to that of the masks before anything else.
-    pub outline_rounds: usize,
-    /// At most so many training frames are looked at, evenly spread over the sequence.
-    pub most_frames: usize,
+    /// Observations of a texel count against the colour spread from its surroundings, which counts as much as such a part
+    /// of one frontal observation.
+    pub prior_weight: f32,
+    /// Texels around each chart that repeat its border, so that interpolation never reads an empty texel.
+    pub gutter: usize,
+    /// How the body's outline is brought closer to that of the masks before anything else.
+    pub clothing: Clothing,
+    /// Which sights of the surface count.
+    pub sighting: Sighting,
+    /// How the surface is covered.
+    pub cover: Cover,
 }
 
 impl Default for TextureInit {
     fn default() -> Self {
-        Self { size: 1024, outline_rounds: 2, most_frames: 64 }
+        Self {
+            size: 1024,
+            prior_weight: 0.02,
+            gutter: 8,
+            clothing: Clothing::default(),
+            sighting: Sighting::default(),
+            cover: Cover::default(),
+        }
     }
 }
 
@@ -114,25 +122,33 @@ pub fn gather_texture(sequence: &Sequence, init: &TextureInit) -> Result<Texture
     if size == 0 || size > MAX_SIZE {
         return Err(Error::invalid("texture size", size.to_string(), format!("1 to {MAX_SIZE} texels")));
     }
-    let training = training::prepared(sequence, init.most_frames)?;
+    let TextureInit { prior_weight, gutter, clothing, sighting, cover, .. } = init;
+    within(
+        "texture",
+        &[("prior_weight", f64::from(*prior_weight), POSITIVE), ("gutter", *gutter as f64, 0.0..=1024.0)],
+    )?;
+    sighting.check("sighting")?;
+    cover.check("cover")?;
+    let training = training::prepared(sequence, cover.most_frames)?;
     let Some(uv) = sequence.body.uv.clone() else {
         let field = format!("sequence {}: body", sequence.id);
         return Err(Error::invalid(field, "no texture coordinates", "uv per face corner (vt and ft)"));
     };
-    let sequence = &clothing::dressed(&training, init.outline_rounds)?;
+    let sequence = &clothing::dressed(&training, clothing, sighting)?;
     let body = &*sequence.body;
-    let coarse = surface::vertex_colours(sequence)?;
+    let coarse = surface::vertex_colours(sequence, sighting, cover)?;
     let atlas = Atlas::new(&uv, size).map_err(Error::scene(sequence))?;
     let parts = Parts::single_points(atlas.points);
-    let colours = consensus(sequence, &parts, 0, 0.0)?;
+    let colours = consensus(sequence, sighting, cover.robust_scale, &parts, (0, 0.0))?;
     let texel = |(part, point): (usize, &SurfacePoint)| -> [f32; 3] {
         let own = colours.of(part)[0].map(|c| 0.5 + c * sh::C0 as f32);
         let around = interpolated(body, &coarse, point);
         let weight = colours.confidence[part];
-        std::array::from_fn(|c| (own[c] * weight + around[c] * PRIOR_WEIGHT) / (weight + PRIOR_WEIGHT))
+        std::array::from_fn(|c| (own[c] * weight + around[c] * prior_weight) / (weight + prior_weight))
     };
     let texels: Vec<[f32; 3]> = parts.points.par_iter().enumerate().map(texel).collect();
-    let image = with_gutter(&atlas.pixels, &texels, size as usize).map_err(Error::scene(sequence))?;
+    let image =
+        with_gutter(&atlas.pixels, &texels, size as usize, *gutter).map_err(Error::scene(sequence))?;
     Ok(TexturedBody { body: sequence.body.clone(), uv, texture: Texture::new(image) })
 }
 
@@ -177,13 +193,18 @@ impl Atlas {
     }
 }
 
-/// The texels on an image of `size`, grown outwards by [`GUTTER`] texels; the rest has the mean colour.
-fn with_gutter(pixels: &[usize], texels: &[[f32; 3]], size: usize) -> Result<Image, SceneError> {
+/// The texels on an image of `size`, grown outwards by `gutter` texels; the rest has the mean colour.
+fn with_gutter(
+    pixels: &[usize],
+    texels: &[[f32; 3]],
+    size: usize,
+    gutter: usize,
+) -> Result<Image, SceneError> {
     let mut values: Vec<Option<[f32; 3]>> = vec![None; size * size];
     for (&pixel, &texel) in pixels.iter().zip(texels) {
         values[pixel] = Some(texel);
     }
-    for _ in 0..GUTTER {
+    for _ in 0..gutter {
         let grown = |(pixel, own): (usize, &Option<[f32; 3]>)| {
             own.or_else(|| mean(neighbours(pixel, size).filter_map(|n| values[n])))
         };

@@ -1,6 +1,7 @@
 //! The frames that an avatar is made from.
 
 use super::Error;
+use glam::DVec3;
 use skinsplat_data::sequence::Sequence;
 
 /// A sequence of which an avatar can be made, thinned to at most `most_frames` frames: the middle one of each of as many
@@ -17,8 +18,29 @@ pub(super) fn prepared(sequence: &Sequence, most_frames: usize) -> Result<Sequen
     if sequence.body.faces.is_empty() {
         return Err(Error::invalid(format!("sequence {}: body", sequence.id), "no faces", "a surface"));
     }
+    check_extent(sequence)?;
     let kept = count.min(most_frames);
     let middle = |part: usize| (2 * part + 1) * count / (2 * kept);
     let frames = (0..kept).map(|part| sequence.frames[middle(part)].clone()).collect();
     Ok(Sequence { frames, ..sequence.clone() })
+}
+
+/// The largest extent of a body's surface, metres: edges are halved until they are millimetres long, and a body in other
+/// units takes all memory.
+const LARGEST_EXTENT: f64 = 10.0;
+
+fn check_extent(sequence: &Sequence) -> Result<(), Error> {
+    let body = &*sequence.body;
+    let corners = || body.faces.iter().flatten().map(|&i| body.vertices[i as usize]);
+    let (low, high) = corners().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| {
+        (low.min(corner), high.max(corner))
+    });
+    let extent = (high - low).max_element();
+    if extent <= LARGEST_EXTENT {
+        return Ok(());
+    }
+    let size = if extent < 1e4 { format!("{extent:.1}") } else { format!("{extent:e}") };
+    let field = format!("sequence {}: body", sequence.id);
+    let expected = format!("at most {LARGEST_EXTENT} m: vertices in metres (are these centimetres?)");
+    Err(Error::invalid(field, format!("its surface is {size} m across"), expected))
 }

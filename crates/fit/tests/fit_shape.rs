@@ -5,7 +5,8 @@ use glam::{DVec3, Vec3};
 use skinsplat_core::scene::{Camera, Image, Mask, Pose, PosedBody, RestBody, Skeleton, SkinWeights};
 use skinsplat_data::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
 use skinsplat_fit::Error;
-use skinsplat_fit::shape::{Ended, FittedShape, ShapeFit, ShapeProgress, fit_shape};
+use skinsplat_fit::options::Clothing;
+use skinsplat_fit::shape::{Ended, FittedShape, ShapeFit, ShapeOptions, ShapeProgress, fit_shape};
 use skinsplat_fit::subdivide::Subdivided;
 use skinsplat_render::mesh::{Mesh, SamplePattern, silhouette};
 use std::f64::consts::{PI, TAU};
@@ -98,8 +99,8 @@ fn sequence(body: &RestBody, truth: &RestBody, directions: &[f64], bends: &[f64]
         id: "train".into(),
         frames: pairs.iter().enumerate().map(frame).collect(),
         body: Arc::new(body.clone()),
-        poses,
-        cameras,
+        poses: poses.into(),
+        cameras: cameras.into(),
         stored_sizes: None,
     }
 }
@@ -115,8 +116,16 @@ fn all_round() -> Vec<f64> {
     (0..8).map(|k| 22.5 * f64::from(k)).collect()
 }
 
+fn with(options: ShapeOptions) -> ShapeFit {
+    ShapeFit { iterations: 120, options, ..ShapeFit::default() }
+}
+
+fn rounds(rounds: usize) -> Clothing {
+    Clothing { rounds, ..Clothing::default() }
+}
+
 fn brief() -> ShapeFit {
-    ShapeFit { iterations: 120, learning_rate: 2e-3, ..ShapeFit::default() }
+    with(ShapeOptions { learning_rate: 2e-3, ..ShapeOptions::default() })
 }
 
 fn fitted(sequence: &Sequence, settings: &ShapeFit) -> Result<FittedShape, Error> {
@@ -133,8 +142,8 @@ fn clothes_are_found_and_hold_in_other_poses_and_views() {
     let body = limb(24);
     let truth = clothed(&body);
     let train = sequence(&body, &truth, &all_round(), &[0.0, 50.0]);
-    for outline_rounds in [0, 2] {
-        let shape = fitted(&train, &ShapeFit { outline_rounds, ..brief() }).unwrap();
+    for clothing in [0, 2].map(rounds) {
+        let shape = fitted(&train, &ShapeFit { clothing, ..brief() }).unwrap();
         assert_eq!((&shape.ended, shape.warnings.len()), (&Ended::Finished, 0));
         shape.body.validate().unwrap();
         assert_eq!(shape.body.faces.len(), 4 * body.faces.len());
@@ -169,7 +178,8 @@ fn a_body_that_fits_stays() {
 fn the_shape_is_the_same_for_any_number_of_threads_and_another_for_another_seed() {
     let body = limb(12);
     let train = sequence(&body, &clothed(&body), &all_round(), &[0.0]);
-    let settings = ShapeFit { iterations: 12, batch: 3, ..ShapeFit::default() };
+    let options = ShapeOptions { batch: 3, ..ShapeOptions::default() };
+    let settings = ShapeFit { iterations: 12, options, ..ShapeFit::default() };
     let make = |threads, settings: &ShapeFit| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| fitted(&train, settings).unwrap())
@@ -240,7 +250,7 @@ fn frames_that_say_nothing_are_named_and_left_out() {
         "{none}"
     );
     let mut away = good.clone();
-    away.poses[0].translation = DVec3::X * 50.0;
+    away.poses = vec![Pose { translation: DVec3::X * 50.0, ..good.poses[0].clone() }].into();
     let outside = fitted(&away, &settings).unwrap_err().to_string();
     assert!(outside.contains("the body's projection lies outside of the image"), "{outside}");
     let empty = Sequence { frames: Vec::new(), ..good };
@@ -255,8 +265,9 @@ fn what_is_not_finite_ends_the_fit_and_keeps_the_last_good_shape() {
     let body = limb(8);
     let train = sequence(&body, &clothed(&body), &[0.0, 90.0], &[0.0]);
     // weights so large that their gradient overflows at the first step away from the rest mesh
-    let wild =
-        ShapeFit { edge_length: 1e308, laplacian: 1e308, learning_rate: 1.0, outline_rounds: 0, ..brief() };
+    let options =
+        ShapeOptions { edge_length: 1e308, laplacian: 1e308, learning_rate: 1.0, ..brief().options };
+    let wild = ShapeFit { clothing: rounds(0), options, ..brief() };
     let shape = fitted(&train, &wild).unwrap();
     let Ended::NotFinite { iteration, frame } = &shape.ended else { panic!("{:?}", shape.ended) };
     assert_eq!((*iteration, frame.as_str(), shape.curve.len()), (1, "regularisers", 1));
@@ -269,19 +280,19 @@ fn what_is_not_finite_ends_the_fit_and_keeps_the_last_good_shape() {
 fn settings_out_of_range_are_named() {
     let body = limb(8);
     let train = sequence(&body, &body, &[0.0], &[0.0]);
-    let base = ShapeFit::default();
-    for (settings, field) in [
-        (ShapeFit { batch: 0, ..base.clone() }, "batch"),
-        (ShapeFit { learning_rate: f64::NAN, ..base.clone() }, "learning_rate"),
-        (ShapeFit { laplacian: -1.0, ..base.clone() }, "laplacian"),
-        (ShapeFit { softness: 1e9, ..base.clone() }, "softness"),
-        (ShapeFit { longest_side: 0, ..base.clone() }, "longest_side"),
+    let base = ShapeOptions::default();
+    for (options, field) in [
+        (ShapeOptions { batch: 0, ..base.clone() }, "batch"),
+        (ShapeOptions { learning_rate: f64::NAN, ..base.clone() }, "learning_rate"),
+        (ShapeOptions { laplacian: -1.0, ..base.clone() }, "laplacian"),
+        (ShapeOptions { softness: 1e9, ..base.clone() }, "softness"),
+        (ShapeOptions { longest_side: 0, ..base.clone() }, "longest_side"),
     ] {
-        match fitted(&train, &settings) {
+        match fitted(&train, &with(options)) {
             Err(Error::Invalid { field: found, .. }) => assert_eq!(found, field),
             other => panic!("{field}: {other:?}"),
         }
     }
-    let unmoved = fitted(&train, &ShapeFit { iterations: 0, outline_rounds: 0, ..base }).unwrap();
+    let unmoved = fitted(&train, &ShapeFit { iterations: 0, clothing: rounds(0), ..with(base) }).unwrap();
     assert!(unmoved.offsets.iter().all(|&o| o == 0.0) && unmoved.curve.is_empty());
 }

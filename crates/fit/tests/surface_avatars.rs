@@ -4,6 +4,7 @@
 use glam::{DVec3, Vec3};
 use skinsplat_core::scene::{Avatar, Camera, Image, Pose, PosedBody, RestBody, Skeleton, SkinWeights, Uv};
 use skinsplat_data::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
+use skinsplat_fit::options::{Clothing, Sighting};
 use skinsplat_fit::surface::{BindTo, Placement, SurfaceInit, surface_init};
 use skinsplat_fit::texture::{TextureInit, gather_texture};
 use skinsplat_fit::{Error, clothing};
@@ -114,9 +115,9 @@ fn sequence(body: &RestBody, truth: RestBody, cameras: Vec<Camera>, shade: Shade
     Sequence {
         id: "train".into(),
         body: Arc::new(body.clone()),
-        poses: vec![Pose::rest(&body.skeleton)],
+        poses: vec![Pose::rest(&body.skeleton)].into(),
         frames: (0..cameras.len()).map(frame).collect(),
-        cameras,
+        cameras: cameras.into(),
         stored_sizes: None,
     }
 }
@@ -228,13 +229,14 @@ fn clothing_is_found_from_the_outlines() {
     let body = sphere(16, RADIUS);
     let cameras = ring((0..12).map(|k| 30.0 * f64::from(k)), &[-0.8, 0.0, 0.8]);
     let train = sequence(&body, sphere(16, RADIUS + 0.02), cameras, painted);
-    let offsets = clothing::offsets_from_outlines(&train, 3).unwrap();
+    let (options, sighting) = (Clothing { rounds: 3, ..Clothing::default() }, Sighting::default());
+    let offsets = clothing::offsets_from_outlines(&train, &options, &sighting).unwrap();
     // a pixel is 7 mm
     for (vertex, &offset) in body.vertices.iter().zip(&offsets) {
         assert!((offset - 0.02).abs() < 0.004, "{vertex}: {offset}");
     }
-    let naked = sequence(&body, body.clone(), train.cameras.clone(), painted);
-    let none = clothing::offsets_from_outlines(&naked, 3).unwrap();
+    let naked = sequence(&body, body.clone(), train.cameras.to_vec(), painted);
+    let none = clothing::offsets_from_outlines(&naked, &options, &sighting).unwrap();
     assert!(
         none.iter().all(|o| o.abs() < 0.001),
         "{:?}",

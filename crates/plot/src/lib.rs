@@ -1,3 +1,5 @@
+#![doc = include_str!("../README.md")]
+//!
 //! Pictures of numbers: data in, SVG text or PNG bytes out. No clock, no files, no fonts of the system: the same data
 //! gives the same bytes everywhere.
 //!

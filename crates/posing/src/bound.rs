@@ -1,6 +1,7 @@
 //! An avatar bound to a body: everything that does not depend on the pose, computed once.
 
 use super::layout::{self, CHUNK, Chunk};
+use super::nearest::NearestFace;
 use super::needs::Group;
 use super::seat::{self, Seat, Surface};
 use super::{CovarianceChoice, Strategy, StrategyError, needs, surfel};
@@ -89,11 +90,45 @@ impl BoundAvatar {
     /// [`StrategyError::Scene`] for whatever [`Avatar::validate`] or [`RestBody::validate`] finds wrong.
     pub fn new(avatar: &Avatar, body: &RestBody) -> Result<Self, StrategyError> {
         body.validate()?;
+        let faces = match &avatar.binding {
+            Binding::Vertex(_) => NearestFace::new(body),
+            Binding::Static | Binding::Face(_) => None,
+        };
+        Self::bind(avatar, body, faces.as_ref(), None)
+    }
+
+    /// Binds an avatar anew to the same body, of which the caller keeps the `faces` (those of `body`; none if it has none).
+    /// Where the Gaussians are those that were bound before, each begins the search for its face at the one it had: the
+    /// result has the bits of [`BoundAvatar::new`].
+    ///
+    /// # Errors
+    /// As [`BoundAvatar::new`]. Nothing has changed then.
+    pub fn rebind(
+        &mut self,
+        avatar: &Avatar,
+        body: &RestBody,
+        faces: Option<&NearestFace<'_>>,
+    ) -> Result<(), StrategyError> {
+        let before = self.surface.as_ref().map(|surface| &surface.seats[..]);
+        *self =
+            Self::bind(avatar, body, faces, before.filter(|seats| seats.len() == avatar.gaussians.len()))?;
+        Ok(())
+    }
+
+    fn bind(
+        avatar: &Avatar,
+        body: &RestBody,
+        faces: Option<&NearestFace<'_>>,
+        before: Option<&[Seat]>,
+    ) -> Result<Self, StrategyError> {
         avatar.validate(Some(body))?;
         let gaussians = &avatar.gaussians;
         let (seats, mixed, moves) = match &avatar.binding {
             Binding::Static => (None, None, Moves::Not),
-            Binding::Vertex(_) => (seat::nearest(&gaussians.means, body), None, Moves::ByWeights),
+            Binding::Vertex(_) => {
+                let seats = faces.map(|faces| seat::nearest(&gaussians.means, body, faces, before));
+                (seats, None, Moves::ByWeights)
+            }
             Binding::Face(binding) => {
                 let seats = seat::given(binding, body);
                 let mixed = mixed_weights(&seats, body)?;

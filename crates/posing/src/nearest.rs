@@ -35,6 +35,34 @@ pub struct NearestFace<'a> {
     faces: &'a [[u32; 3]],
     nodes: Vec<Node>,
     order: Vec<u32>,
+    /// The largest coordinate of a vertex.
+    extent: f64,
+}
+
+/// The nearest point found so far.
+struct Best {
+    /// Squared distance.
+    distance: f64,
+    point: SurfacePoint,
+    /// Boxes at a larger squared distance hold no face that is nearer, however distances were rounded.
+    limit: f64,
+    /// Bound on the rounding error of a distance.
+    slack: f64,
+}
+
+impl Best {
+    fn none(slack: f64) -> Self {
+        let point = SurfacePoint { face: u32::MAX, barycentric: [1.0, 0.0, 0.0] };
+        Self { distance: f64::INFINITY, point, limit: f64::INFINITY, slack }
+    }
+
+    fn offer(&mut self, distance: f64, face: u32, barycentric: [f64; 3]) {
+        if distance < self.distance || (distance == self.distance && face < self.point.face) {
+            let reach = distance.sqrt() + self.slack;
+            *self =
+                Self { distance, point: SurfacePoint { face, barycentric }, limit: reach * reach, ..*self };
+        }
+    }
 }
 
 impl<'a> NearestFace<'a> {
@@ -44,7 +72,9 @@ impl<'a> NearestFace<'a> {
             return None;
         }
         let order = (0..body.faces.len() as u32).collect();
-        let mut tree = Self { vertices: &body.vertices, faces: &body.faces, nodes: Vec::new(), order };
+        let extent = body.vertices.iter().fold(0.0, |most: f64, v| most.max(v.abs().max_element()));
+        let nodes = Vec::new();
+        let mut tree = Self { vertices: &body.vertices, faces: &body.faces, nodes, order, extent };
         let centroids: Vec<DVec3> =
             (0..body.faces.len() as u32).map(|f| tree.corners(f).iter().sum()).collect();
         tree.build(&centroids, 0, body.faces.len());
@@ -52,14 +82,21 @@ impl<'a> NearestFace<'a> {
     }
 
     /// The point of the mesh nearest to `point`. Of faces at exactly the same distance the lowest index wins.
-    pub fn nearest(&self, point: DVec3) -> SurfacePoint {
-        let mut best = (f64::INFINITY, SurfacePoint { face: u32::MAX, barycentric: [1.0, 0.0, 0.0] });
+    ///
+    /// A `guess`, such as the face that was nearest before the point moved a little, makes the search shorter and never
+    /// changes what it finds.
+    pub fn nearest(&self, point: DVec3, guess: Option<u32>) -> SurfacePoint {
+        // A nearest point is a sum of three products of coordinates: some units in the last place of the largest.
+        let mut best = Best::none(16.0 * f64::EPSILON * (self.extent + point.abs().max_element()));
+        if let Some(face) = guess.filter(|&face| (face as usize) < self.faces.len()) {
+            self.improve(point, face, &mut best);
+        }
         let mut waiting = [(0.0, 0u32); DEPTH];
         let mut count = 1;
         while count > 0 {
             count -= 1;
             let (distance, index) = waiting[count];
-            if distance > best.0 {
+            if distance > best.limit {
                 continue;
             }
             let node = &self.nodes[index as usize];
@@ -72,20 +109,19 @@ impl<'a> NearestFace<'a> {
             let child = |index: u32| (box_distance(&self.nodes[index as usize], point), index);
             let (a, b) = (child(index + 1), child(node.second_child));
             let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
-            (waiting[count], waiting[count + 1]) = (far, near);
-            count += 2;
+            for next in [far, near].into_iter().filter(|next| next.0 <= best.limit) {
+                waiting[count] = next;
+                count += 1;
+            }
         }
-        best.1
+        best.point
     }
 
-    fn improve(&self, point: DVec3, face: u32, best: &mut (f64, SurfacePoint)) {
+    fn improve(&self, point: DVec3, face: u32, best: &mut Best) {
         let corners = self.corners(face);
         let barycentric = nearest_barycentric(corners, point);
         let on_face: DVec3 = corners.iter().zip(barycentric).map(|(&corner, b)| corner * b).sum();
-        let distance = on_face.distance_squared(point);
-        if distance < best.0 || (distance == best.0 && face < best.1.face) {
-            *best = (distance, SurfacePoint { face, barycentric });
-        }
+        best.offer(on_face.distance_squared(point), face, barycentric);
     }
 
     fn corners(&self, face: u32) -> [DVec3; 3] {
@@ -196,9 +232,37 @@ mod tests {
         for k in 0..500u32 {
             let t = f64::from(k);
             let point = DVec3::new((t * 0.37).sin() * 2.0, (t * 0.73).cos() * 2.0, (t * 0.11).sin());
-            let mut best = (f64::INFINITY, SurfacePoint { face: u32::MAX, barycentric: [1.0, 0.0, 0.0] });
-            (0..body.faces.len() as u32).for_each(|face| tree.improve(point, face, &mut best));
-            assert_eq!(tree.nearest(point), best.1);
+            let best = of_all(&tree, point);
+            assert_eq!(tree.nearest(point, None), best);
+            for guess in [0, k % body.faces.len() as u32, best.face, u32::MAX] {
+                assert_eq!(tree.nearest(point, Some(guess)), best, "{guess}");
+            }
+        }
+    }
+
+    fn of_all(tree: &NearestFace<'_>, point: DVec3) -> SurfacePoint {
+        let mut best = Best::none(0.0);
+        (0..tree.faces.len() as u32).for_each(|face| tree.improve(point, face, &mut best));
+        best.point
+    }
+
+    proptest::proptest! {
+        /// On lattices many faces are equally near, up to rounding, and boxes touch the faces in them.
+        #[test]
+        fn a_guess_changes_nothing(
+            steps in proptest::collection::vec((0u32..16, 0u32..16, -2i32..3), 1..40),
+            scale in 0.1f64..10.0,
+            guess in 0u32..700,
+        ) {
+            let mut body = sheet(16);
+            body.vertices.iter_mut().for_each(|v| *v = DVec3::new(v.x * 0.7, v.y * 0.5, 0.0).round() * scale);
+            let tree = NearestFace::new(&body).unwrap();
+            for (x, y, z) in steps {
+                let point = DVec3::new(f64::from(x), f64::from(y), f64::from(z)) * (0.5 * scale / 3.0);
+                let best = of_all(&tree, point);
+                proptest::prop_assert_eq!(tree.nearest(point, None), best);
+                proptest::prop_assert_eq!(tree.nearest(point, Some(guess)), best);
+            }
         }
     }
 
@@ -208,7 +272,7 @@ mod tests {
         let tree = NearestFace::new(&body).unwrap();
         for (v, &point) in body.vertices.iter().enumerate() {
             let lowest = body.faces.iter().position(|f| f.contains(&(v as u32))).unwrap();
-            assert_eq!(tree.nearest(point).face as usize, lowest);
+            assert_eq!(tree.nearest(point, None).face as usize, lowest);
         }
     }
 

@@ -108,15 +108,20 @@ impl Surface {
     }
 }
 
-/// The points of the rest mesh nearest to the means; `None` if the body has no faces.
-pub(crate) fn nearest(means: &[Vec3], body: &RestBody) -> Option<Vec<Seat>> {
-    let tree = NearestFace::new(body)?;
-    let seat = |mean: &Vec3| {
-        let point = tree.nearest(mean.as_dvec3());
+/// The points of the rest mesh nearest to the means. `before` are their seats before they moved, if anyone knows.
+pub(crate) fn nearest(
+    means: &[Vec3],
+    body: &RestBody,
+    faces: &NearestFace<'_>,
+    before: Option<&[Seat]>,
+) -> Vec<Seat> {
+    let seat = |(i, mean): (usize, &Vec3)| {
+        let guess = before.and_then(|seats| seats.get(i)).map(|seat| seat.face);
+        let point = faces.nearest(mean.as_dvec3(), guess);
         let barycentric = point.barycentric.map(|b| b as f32);
         Seat { face: point.face, corners: body.faces[point.face as usize], barycentric, offset: 0.0 }
     };
-    Some(means.par_iter().map(seat).collect())
+    means.par_iter().enumerate().map(seat).collect()
 }
 
 /// The seats of face-bound Gaussians.

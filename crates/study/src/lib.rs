@@ -1,3 +1,5 @@
+#![doc = include_str!("../README.md")]
+//!
 //! Sweeps as data: [`trade`] measures what every choice costs and how far it is from the exact answer, [`stress`] where each
 //! breaks.
 

@@ -1,3 +1,5 @@
+#![doc = include_str!("../README.md")]
+//!
 //! The dataset that needs no file: articulated subjects with exact skeletons, skinning weights, motions and true images,
 //! made in-process from a few parameters, bit for bit the same for any number of threads.
 //!

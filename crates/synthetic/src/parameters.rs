@@ -11,7 +11,7 @@ pub const GENERATOR_VERSION: u32 = 1;
 /// All parameters of a subject. Every field has a default; unknown fields are refused.
 ///
 /// ```
-/// use skinsplat::data::synthetic::Parameters;
+/// use skinsplat_synthetic::Parameters;
 /// let text = r#"
 /// capture = "monocular"
 /// resolution = 256
@@ -58,8 +58,10 @@ pub struct Parameters {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Lights {
-    /// The world, as in a studio: a highlight slides over the surface when the subject turns, and no per-Gaussian
-    /// colour model can follow.
+    /// The world, as in a studio: a highlight slides over the surface when the subject turns. To one fixed camera the lights
+    /// turn together with the line of sight, as seen from the surface: but for a roll about that line, colours read in the
+    /// surface's own frame can follow as far as their SH bands reach, and colours read in world directions cannot. To
+    /// several cameras one view of the surface appears under different lights, which no function of the view follows.
     #[default]
     World,
     /// The surface: colours are those of the rest pose seen from the direction that the local rotation (the polar factor

@@ -8,7 +8,7 @@ use super::truth::Model;
 use super::{figure, parameters::GENERATOR_VERSION};
 use skinsplat_core::scene::{Camera, Pose, RestBody, SceneError};
 use skinsplat_data::Capture;
-use skinsplat_data::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
+use skinsplat_data::{FrameGenerator, FrameRef, FrameSource, Sequence, SourceDigest, Sourced, Truth};
 use std::sync::Arc;
 
 /// A subject: a body, and sequences whose images are rendered when asked for.
@@ -96,12 +96,10 @@ impl Subject {
     /// Every pose seen by every camera of a role, camera by camera.
     fn sequence(&self, id: &str, poses: Vec<Pose>, role: Role) -> Sequence {
         let cameras = stage::cameras(&self.parameters, role);
-        let take = Take {
-            model: Arc::clone(&self.model),
-            key: format!("{} {id}", self.parameters.key()),
-            poses: poses.clone(),
-            cameras: cameras.clone(),
-        };
+        let key = format!("{} {id}", self.parameters.key());
+        let source = SourceDigest::of_bytes(key.as_bytes());
+        let take =
+            Take { model: Arc::clone(&self.model), key, poses: poses.clone(), cameras: cameras.clone() };
         let generator: Arc<dyn FrameGenerator> = Arc::new(take);
         let frame = |frame: usize| {
             let (camera, pose) = (frame / poses.len(), frame % poses.len());
@@ -117,8 +115,8 @@ impl Subject {
         Sequence {
             id: id.to_owned(),
             body: Arc::clone(self.body()),
-            poses,
-            cameras,
+            poses: Sourced::computed(poses, source),
+            cameras: Sourced::computed(cameras, source),
             frames,
             stored_sizes: None,
         }

@@ -60,7 +60,7 @@ impl Motion {
         let track = poses::load_clip(path, self.clip.as_deref())?;
         let (body_path, model) = self.model(avatar, path, stored.body.as_deref())?;
         let rest = model.shaped(&track.betas).with_context(|| format!("{}", path.display()))?;
-        let motion: Vec<Pose> = track.poses(&rest.skeleton)?;
+        let motion: Vec<Pose> = track.poses(&rest.skeleton)?.to_vec();
         let bound = BoundAvatar::new(&stored.avatar, &rest).with_context(|| {
             format!("{}: does not fit the body {}", avatar.display(), body_path.display())
         })?;

@@ -177,6 +177,9 @@ pub struct RestBody {
     pub pose_directions: Vec<Vec<Vec3>>,
 }
 
+/// The largest coordinate of a vertex, metres: far beyond, squares of distances overflow.
+const MAX_COORDINATE: f64 = 1e12;
+
 impl RestBody {
     /// Checks counts and indices.
     ///
@@ -191,8 +194,12 @@ impl RestBody {
                 format!("{v} (vertices)"),
             ));
         }
-        if let Some(i) = self.vertices.iter().position(|p| !p.is_finite()) {
-            return Err(SceneError::new(format!("v_template[{i}]"), "NaN or infinite", "finite metres"));
+        let too_far = |p: &DVec3| p.to_array().into_iter().any(|c| c.is_nan() || c.abs() > MAX_COORDINATE);
+        if let Some(i) = self.vertices.iter().position(too_far) {
+            let [x, y, z] = self.vertices[i].to_array();
+            let problem = format!("({x:e}, {y:e}, {z:e})");
+            let expected = format!("metres, at most {MAX_COORDINATE:e} from the origin");
+            return Err(SceneError::new(format!("v_template[{i}]"), problem, expected));
         }
         if let Some(i) = self.faces.iter().position(|f| f.iter().any(|&k| k as usize >= v)) {
             let problem = format!("vertex indices {:?}", self.faces[i]);

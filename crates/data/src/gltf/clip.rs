@@ -2,6 +2,8 @@
 
 use super::buffers::Source;
 use super::{Joints, Rig, unit};
+use crate::SourceDigest;
+use crate::digest::Fingerprint;
 use ::gltf::accessor::{DataType, Dimensions, Item};
 use ::gltf::animation::{Channel as GltfChannel, Interpolation, Property};
 use glam::{DQuat, DVec3, DVec4};
@@ -86,6 +88,22 @@ impl Clip {
             return Err(SceneError::new(format!("animation {}", self.name), problem, "a shorter clip"));
         }
         Ok(times.iter().map(|&time| self.pose_at(rig, time)).collect())
+    }
+}
+
+impl Clip {
+    /// The digest of what the file stores of the clip and of the rest pose that it moves.
+    pub(crate) fn digest(&self, rig: &Rig) -> SourceDigest {
+        let mut hash = Fingerprint::new();
+        hash.count(rig.body.rest.skeleton.len());
+        rig.body.rest.skeleton.rest_locals.iter().for_each(|local| hash.local(local));
+        hash.count(self.channels.len());
+        for Channel { node, property, interpolation, times, values } in &self.channels {
+            hash.count(*node).bytes(format!("{property:?} {interpolation:?}").as_bytes()).count(times.len());
+            hash.numbers(times.iter().copied());
+            hash.count(values.len()).numbers(values.iter().flat_map(|v| v.to_array()));
+        }
+        hash.finish()
     }
 }
 

@@ -276,7 +276,7 @@ fn animations_are_sampled_as_they_interpolate() {
     }
     let track = poses::load_clip(&path, Some("linear")).unwrap();
     let expected = linear.key_poses(&rig).unwrap();
-    assert_eq!(track.poses(&rig.body.rest.skeleton).unwrap(), expected);
+    assert_eq!(*track.poses(&rig.body.rest.skeleton).unwrap(), expected);
     let error = poses::load(&path).unwrap_err().to_string();
     assert!(error.ends_with("animations: 2 clips and no name; expected one of: linear, spline"), "{error}");
     // A skeleton with the same names in another order gets the same motion.

@@ -151,8 +151,8 @@ fn poses_come_whole_or_in_parts() {
     let listed = poses::load(&json).unwrap();
     let body = body::load(&crate::support::data("blender/models/anny_smplx55.npz")).unwrap();
     let expected = whole.poses(&body.rest.skeleton).unwrap();
-    assert_eq!(joined.poses(&body.rest.skeleton).unwrap(), expected);
-    assert_eq!(listed.poses(&body.rest.skeleton).unwrap(), expected);
+    assert_eq!(*joined.poses(&body.rest.skeleton).unwrap(), *expected);
+    assert_eq!(*listed.poses(&body.rest.skeleton).unwrap(), *expected);
     assert_eq!(whole.num_joints(), 55);
     // Fewer joints than the body: the others rest. More: refused.
     let short = poses::load(&write(folder.path(), &[("thetas", &[1, 66], ramp(66, 0.0))])).unwrap();

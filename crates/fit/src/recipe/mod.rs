@@ -9,6 +9,8 @@ mod file;
 pub use file::RECIPES;
 
 use crate::Error;
+use crate::options::{Clothing, Cover, Moments, NOT_NEGATIVE, POSITIVE, Schedule, Sighting, within};
+use crate::shape::ShapeOptions;
 use serde::{Deserialize, Serialize};
 
 /// How an avatar is fitted to the frames of a training sequence.
@@ -45,6 +47,21 @@ pub struct Recipe {
     /// A textured mesh that is drawn with the Gaussians; none if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<MeshLayer>,
+    /// How the body's outline is brought onto those of the masks.
+    #[serde(default)]
+    pub clothing: Clothing,
+    /// Which sights of the surface count.
+    #[serde(default)]
+    pub sighting: Sighting,
+    /// How the surface is covered.
+    #[serde(default)]
+    pub cover: Cover,
+    /// How the surface is fitted to the silhouettes, where `start.surface` asks for it.
+    #[serde(default)]
+    pub shape: ShapeOptions,
+    /// When things happen, and how steps are made.
+    #[serde(default)]
+    pub schedule: Schedule,
 }
 
 /// A recipe with a budget.
@@ -62,15 +79,13 @@ pub struct FitOptions {
 }
 
 impl FitOptions {
-    /// Iterations of the first stage, where there is one: a quarter of the fit's (§4.4 of the paper), but no more than
-    /// help. Its steps look at four frames each.
+    /// Iterations of the first stage, where there is one: a share of the fit's, but no more than help. Its steps look at
+    /// several frames each.
     pub fn shape_iterations(&self) -> u32 {
-        (self.iterations / 4).clamp(1, MOST_SHAPE_ITERATIONS)
+        let Schedule { shape_share, most_shape_iterations, .. } = self.recipe.schedule;
+        ((f64::from(self.iterations) * shape_share) as u32).clamp(1, most_shape_iterations.max(1))
     }
 }
-
-/// Beyond so many, outlines gain a ten-thousandth of their overlap and what lies between them drifts.
-const MOST_SHAPE_ITERATIONS: u32 = 400;
 
 /// What is behind the avatar and the truth in the loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -184,7 +199,7 @@ pub enum FreeScale {
     All,
 }
 
-/// Learning rates of Adam (β 0.9 and 0.999), per iteration, in the units of the stored parameters.
+/// Learning rates of Adam, per iteration, in the units of the stored parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rates {
@@ -239,6 +254,15 @@ pub struct MeshLayer {
     pub texture: u32,
     /// Learning rate of the texels' colours; 0 leaves them as gathered.
     pub rate: f32,
+    /// See [`TextureInit::prior_weight`](crate::texture::TextureInit).
+    #[serde(default = "defaults::prior_weight")]
+    pub prior_weight: f32,
+    /// See [`TextureInit::gutter`](crate::texture::TextureInit).
+    #[serde(default = "defaults::gutter")]
+    pub gutter: usize,
+    /// Of Adam's steps on the texels.
+    #[serde(default = "defaults::texel_moments")]
+    pub moments: Moments,
 }
 
 /// How Gaussians come and go: adaptive density control of 3DGS, on a body.
@@ -261,6 +285,44 @@ pub struct Densify {
     pub most: f32,
     /// Whether face-bound Gaussians walk onto the triangle that they slide into (SplattingAvatar).
     pub walk: bool,
+    /// A Gaussian that walks crosses at most so many edges at a time.
+    #[serde(default = "defaults::most_crossings")]
+    pub most_crossings: u32,
+    /// What a Gaussian that is split shrinks by (3DGS).
+    #[serde(default = "defaults::shrink")]
+    pub shrink: f32,
+    /// How far the halves of a split Gaussian sit from the whole, standard deviations.
+    #[serde(default = "defaults::apart")]
+    pub apart: f32,
+}
+
+/// Values of fields that recipes need not name.
+mod defaults {
+    use crate::options::Moments;
+
+    pub(super) fn prior_weight() -> f32 {
+        0.02
+    }
+
+    pub(super) fn gutter() -> usize {
+        8
+    }
+
+    pub(super) fn texel_moments() -> Moments {
+        Moments::with_epsilon(1e-8)
+    }
+
+    pub(super) fn most_crossings() -> u32 {
+        16
+    }
+
+    pub(super) fn shrink() -> f32 {
+        1.6
+    }
+
+    pub(super) fn apart() -> f32 {
+        0.5
+    }
 }
 
 impl Recipe {
@@ -352,7 +414,13 @@ impl Recipe {
             if !(mesh.rate.is_finite() && mesh.rate >= 0.0) {
                 return refuse("mesh.rate", mesh.rate.to_string(), "a finite number, at least 0");
             }
+            mesh.moments.check("mesh.moments")?;
         }
+        self.clothing.check("clothing")?;
+        self.sighting.check("sighting")?;
+        self.cover.check("cover")?;
+        self.shape.check("shape")?;
+        self.schedule.check("schedule")?;
         self.densify.as_ref().map_or(Ok(()), |densify| densify.check(&self.id))
     }
 }
@@ -369,6 +437,14 @@ impl Densify {
         if let Some((key, value)) = positive.iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
             return refuse(key, *value, "a finite number above 0");
         }
+        within(
+            "densify",
+            &[
+                ("shrink", f64::from(self.shrink), POSITIVE),
+                ("apart", f64::from(self.apart), NOT_NEGATIVE),
+                ("most_crossings", f64::from(self.most_crossings), 0.0..=1e6),
+            ],
+        )?;
         if !(self.most.is_finite() && self.most >= 1.0) {
             return refuse("most", self.most, "a finite number, at least 1");
         }

@@ -1,6 +1,7 @@
 //! What an optimiser of the shape needs of each frame: the mask, and where every vertex goes in the image as its offset
 //! changes.
 
+use super::ShapeOptions;
 use super::surface::Surface;
 use crate::Error;
 use crate::silhouette::{self, Blur, Match, Window};
@@ -9,13 +10,6 @@ use skinsplat_core::scene::{Camera, Mask, PosedBody};
 use skinsplat_data::sequence::Sequence;
 use skinsplat_render::mesh::NEAR_PLANE;
 use std::sync::Arc;
-
-/// Pixels around the mask and the body at rest that are looked at beside what the filter needs.
-const MARGIN: usize = 8;
-/// A mask of less area than this is empty, pixels.
-const LEAST_AREA: f64 = 1.0;
-/// A mask that covers more than this part of its image has no outline.
-const MOST_COVERED: f64 = 0.999;
 
 /// One frame: a filtered mask, and vertices in camera space as linear functions of their offsets. Posing is linear in the
 /// rest position, so that Eq. 6 is evaluated once per frame and not once per step.
@@ -42,9 +36,10 @@ impl View {
         surface: &Surface,
         offsets: &[f64],
         blur: &Blur,
+        options: &ShapeOptions,
     ) -> Result<Result<Self, Unusable>, Error> {
         let truth = sequence.truth(index)?.alpha;
-        if let Some(problem) = unusable_mask(&truth) {
+        if let Some(problem) = unusable_mask(&truth, options) {
             return Ok(Err(problem));
         }
         let frame = &sequence.frames[index];
@@ -57,7 +52,7 @@ impl View {
         let Some(body) = bounds(&points, &truth) else {
             return Ok(Err("the body's projection lies outside of the image"));
         };
-        view.window = around(body, &truth, MARGIN + 2 * blur.reach());
+        view.window = around(body, &truth, options.margin + 2 * blur.reach());
         let raw = cropped(&truth, view.window);
         if silhouette::common_area(&surface.topology, &points, view.window, &raw) <= 0.0 {
             return Ok(Err("the mask misses the body"));
@@ -120,16 +115,16 @@ impl View {
     }
 }
 
-fn unusable_mask(mask: &Mask) -> Option<Unusable> {
+fn unusable_mask(mask: &Mask, options: &ShapeOptions) -> Option<Unusable> {
     if mask.values().iter().any(|v| !v.is_finite()) {
         return Some("the mask has a value that is not finite");
     }
     let area: f64 = mask.values().iter().map(|&v| f64::from(v)).sum();
-    if area < LEAST_AREA {
+    if area < options.least_area {
         return Some("the mask is empty");
     }
     let covered = area / mask.values().len() as f64;
-    (covered > MOST_COVERED).then_some("the mask covers the whole image")
+    (covered > options.most_covered).then_some("the mask covers the whole image")
 }
 
 /// First and last column and row of the pixels of an image that points lie in; `None` if there are none.

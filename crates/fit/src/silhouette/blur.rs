@@ -1,8 +1,5 @@
 //! A Gaussian filter over a window of pixels.
 
-/// Values beyond this many standard deviations are left out.
-const REACH: f64 = 3.0;
-
 /// A separable, truncated Gaussian that sums to one; outside of the window everything is zero, so that the filter is a
 /// symmetric matrix and its own adjoint.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,9 +9,9 @@ pub(crate) struct Blur {
 }
 
 impl Blur {
-    /// A filter of a standard deviation in pixels; zero changes nothing.
-    pub(crate) fn new(sigma: f64) -> Self {
-        let reach = (REACH * sigma).ceil() as usize;
+    /// A filter of a standard deviation in pixels, cut off beyond `reach` of them; zero changes nothing.
+    pub(crate) fn new(sigma: f64, reach: f64) -> Self {
+        let reach = (reach * sigma).ceil() as usize;
         let at = |k: usize| if k == 0 { 1.0 } else { (-0.5 * (k as f64 / sigma).powi(2)).exp() };
         let weights: Vec<f64> = (0..=reach).map(at).collect();
         let sum = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
@@ -66,7 +63,7 @@ mod tests {
 
     #[test]
     fn a_point_becomes_a_gaussian_of_the_same_sum() {
-        let blur = Blur::new(0.8);
+        let blur = Blur::new(0.8, 3.0);
         let mut values = vec![0.0; 11 * 7];
         values[3 * 11 + 5] = 1.0;
         blur.apply(&mut values, 11);
@@ -74,12 +71,12 @@ mod tests {
         let at = |x: usize, y: usize| values[y * 11 + x];
         assert!((at(6, 3) / at(5, 3) - (-0.5f64 / 0.64).exp()).abs() < 1e-12);
         assert_eq!((at(6, 3), at(4, 3)), (at(5, 4), at(5, 2)));
-        assert_eq!(Blur::new(0.0).reach(), 0);
+        assert_eq!(Blur::new(0.0, 3.0).reach(), 0);
     }
 
     #[test]
     fn it_is_its_own_adjoint_also_at_the_border() {
-        let blur = Blur::new(1.7);
+        let blur = Blur::new(1.7, 3.0);
         let (a, b) = (image(1), image(2));
         let (mut blurred_a, mut blurred_b) = (a.clone(), b.clone());
         blur.apply(&mut blurred_a, 11);

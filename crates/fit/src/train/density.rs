@@ -11,11 +11,6 @@ use serde::{Deserialize, Serialize};
 use skinsplat_core::scene::{Avatar, Binding, Gaussians, PosedGradient, RestBody, SceneError, SkinWeights};
 use skinsplat_posing::nearest::NearestFace;
 
-/// What a Gaussian that is split shrinks by (3DGS).
-const SHRINK: f32 = 1.6;
-/// How far halves sit from the whole, standard deviations.
-const APART: f32 = 0.5;
-
 /// Mean gradients on screen since the last change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Density {
@@ -56,11 +51,15 @@ pub(super) fn is_due(settings: &Densify, done: u32, iterations: u32) -> bool {
 }
 
 /// The skinning weights of the points of the body nearest to each mean.
-fn nearest_weights(means: &[Vec3], body: &RestBody) -> Result<SkinWeights, SceneError> {
-    let tree = NearestFace::new(body)
-        .ok_or_else(|| SceneError::new("body.faces", "none", "faces to take skinning weights from"))?;
+fn nearest_weights(
+    means: &[Vec3],
+    body: &RestBody,
+    faces: Option<&NearestFace<'_>>,
+) -> Result<SkinWeights, SceneError> {
+    let faces =
+        faces.ok_or_else(|| SceneError::new("body.faces", "none", "faces to take skinning weights from"))?;
     let row = |mean: &Vec3| {
-        let point = tree.nearest(mean.as_dvec3());
+        let point = faces.nearest(mean.as_dvec3(), None);
         let corners = body.faces[point.face as usize];
         body.weights.mixed(&[0, 1, 2].map(|k: usize| (corners[k] as usize, point.barycentric[k])))
     };
@@ -84,31 +83,32 @@ pub(super) fn change(
     parameters: &mut Parameters,
     density: &mut Density,
     body: &RestBody,
+    faces: Option<&NearestFace<'_>>,
 ) -> Result<(), SceneError> {
     let fates = fates(settings, &parameters.avatar.gaussians, density);
     let mut next = Next::default();
     for (i, fate) in fates.iter().enumerate() {
         match fate {
             Fate::Go => {}
-            Fate::Stay => next.take(parameters, i, Some(i), 0.0),
+            Fate::Stay => next.take(parameters, i, Some(i), None),
             Fate::Clone => {
-                next.take(parameters, i, Some(i), 0.0);
-                next.take(parameters, i, None, 0.0);
+                next.take(parameters, i, Some(i), None);
+                next.take(parameters, i, None, None);
             }
             Fate::Split => {
-                next.take(parameters, i, None, APART);
-                next.take(parameters, i, None, -APART);
+                next.take(parameters, i, None, Some((settings.apart, settings.shrink)));
+                next.take(parameters, i, None, Some((-settings.apart, settings.shrink)));
             }
         }
     }
     let Next { gaussians, sources, parents, origins, shifts } = next;
     let binding = match &parameters.avatar.binding {
         Binding::Static => Binding::Static,
-        Binding::Vertex(_) => Binding::Vertex(nearest_weights(&gaussians.means, body)?),
+        Binding::Vertex(_) => Binding::Vertex(nearest_weights(&gaussians.means, body, faces)?),
         Binding::Face(binding) => {
             let mut moved = walk::inherited(binding, &parents, &shifts, body);
             if settings.walk {
-                walk::walk(&mut moved, body, &Neighbours::new(body));
+                walk::walk(&mut moved, body, &Neighbours::new(body), settings.most_crossings);
             }
             Binding::Face(moved)
         }
@@ -155,8 +155,9 @@ struct Next {
 }
 
 impl Next {
-    /// Takes over Gaussian `i`, or one of its halves, `apart` standard deviations along its longest axis.
-    fn take(&mut self, parameters: &Parameters, i: usize, source: Option<usize>, apart: f32) {
+    /// Takes over Gaussian `i`, or one of its halves: so many standard deviations along its longest axis, and so many times
+    /// smaller.
+    fn take(&mut self, parameters: &Parameters, i: usize, source: Option<usize>, half: Option<(f32, f32)>) {
         let from = &parameters.avatar.gaussians;
         let count = from.sh_count();
         let log_scale = from.log_scales[i];
@@ -169,8 +170,8 @@ impl Next {
         };
         let [w, x, y, z] = from.rotations[i];
         let axis = Quat::from_xyzw(x, y, z, w).normalize() * longest;
+        let (apart, shrink) = half.map_or((0.0, 0.0), |(apart, shrink)| (apart, shrink.ln()));
         let shift = axis * (apart * log_scale.max_element().exp());
-        let shrink = if apart == 0.0 { 0.0 } else { SHRINK.ln() };
         let to = &mut self.gaussians;
         to.sh_degree = from.sh_degree;
         to.means.push(from.means[i] + shift);
@@ -201,6 +202,10 @@ mod tests {
             prune_opacity: 0.1,
             most: 2.0,
             walk: false,
+            ..crate::recipe::RECIPES
+                .iter()
+                .find_map(|recipe| recipe.densify.clone())
+                .expect("one that densifies")
         };
         let due: Vec<u32> = (0..=100).filter(|&done| is_due(&settings, done, 100)).collect();
         assert_eq!(due, [20, 40, 60]);

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::adam::Adam;
-use crate::recipe::MeshLayer;
+use crate::recipe::{MeshLayer, Recipe};
 use crate::texture::{SAMPLES, TextureInit, TexturedBody, gather_texture};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -31,13 +31,20 @@ pub(super) struct State {
 
 impl Layer {
     /// Gathers the texture with which a fit starts. Vertices are rounded to `f32`, in which they are kept.
-    pub(super) fn new(sequence: &Sequence, recipe: &MeshLayer) -> Result<Self, Error> {
-        let init = TextureInit { size: recipe.texture, ..TextureInit::default() };
+    pub(super) fn new(sequence: &Sequence, recipe: &Recipe, mesh: &MeshLayer) -> Result<Self, Error> {
+        let init = TextureInit {
+            size: mesh.texture,
+            prior_weight: mesh.prior_weight,
+            gutter: mesh.gutter,
+            clothing: recipe.clothing.clone(),
+            sighting: recipe.sighting.clone(),
+            cover: recipe.cover.clone(),
+        };
         let mut textured = gather_texture(sequence, &init)?;
         let vertices = textured.body.vertices.iter().map(|v| v.as_vec3().as_dvec3()).collect();
         textured.body = Arc::new(RestBody { vertices, ..(*textured.body).clone() });
         let texels = textured.texture.image().pixels().as_flattened().len();
-        Ok(Self::with(textured, Adam::new(texels), recipe))
+        Ok(Self::with(textured, Adam::new(texels, mesh.moments), mesh))
     }
 
     /// Goes on from a checkpoint.

@@ -20,8 +20,8 @@ use super::loss::{FrameLoss, Losses, Weights};
 use super::shape::{Ended, ShapeFit, fit_shape};
 use super::surface::{SurfaceInit, surface_init};
 use super::texture::TexturedBody;
-use crate::recipe::FitOptions;
-use crate::recipe::{FitBackground, Surface};
+use crate::options::Clothing;
+use crate::recipe::{FitBackground, FitOptions, Recipe, Surface};
 use density::Density;
 use frames::TrainingFrames;
 use layer::Layer;
@@ -33,14 +33,12 @@ use skinsplat_core::scene::{
     RestBody,
 };
 use skinsplat_data::sequence::Sequence;
+use skinsplat_posing::nearest::NearestFace;
 use skinsplat_posing::{BoundAvatar, Strategy, pose, pose_backward};
 use skinsplat_render::mesh::Drawing;
 use skinsplat_render::splat::{Derivatives, RenderSettings, Renderer};
 use std::ops::ControlFlow;
 use std::sync::Arc;
-
-/// Iterations between two bindings of the avatar to its body.
-const BETWEEN_BINDINGS: u32 = 50;
 
 /// What an iteration did.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -82,6 +80,8 @@ pub struct Trainer<'a> {
     layer: Option<Layer>,
     iteration: u32,
     bound: BoundAvatar,
+    /// Of the body, for Gaussians that look for the face nearest to them.
+    faces: Option<NearestFace<'a>>,
     frames: TrainingFrames<'a>,
     warnings: Vec<String>,
     scratch: Scratch,
@@ -98,32 +98,54 @@ struct Scratch {
     of_avatar: AvatarGradient,
 }
 
+/// All that the avatar with which a fit starts depends on, but the frames: what a content key of it must hold.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Starting {
+    /// The Gaussians on the surface.
+    pub init: SurfaceInit,
+    /// The fit of the surface itself; none if it is taken from the outlines.
+    pub shape: Option<ShapeFit>,
+}
+
+impl Starting {
+    /// Of a recipe and its budget.
+    pub fn of(options: &FitOptions) -> Self {
+        let Recipe { start, clothing, sighting, cover, shape, .. } = &options.recipe;
+        let init = SurfaceInit {
+            placement: start.placement,
+            bind_to: start.bind_to,
+            longest_edge: f64::from(options.edge_mm) / 1000.0,
+            scale: start.scale,
+            thickness: start.thickness,
+            opacity: start.opacity,
+            inset: start.inset,
+            sh_degree: 0,
+            refinements: 0,
+            clothing: clothing.clone(),
+            sighting: sighting.clone(),
+            cover: cover.clone(),
+            ..SurfaceInit::default()
+        };
+        let shape = (start.surface == Surface::Silhouettes).then(|| ShapeFit {
+            iterations: options.shape_iterations() as usize,
+            seed: options.seed,
+            clothing: clothing.clone(),
+            sighting: sighting.clone(),
+            options: shape.clone(),
+        });
+        Self { init, shape }
+    }
+}
+
 /// The avatar with which a recipe starts.
 ///
 /// # Errors
 /// As [`surface_init`] and [`fit_shape`]; a shape fit that diverges.
 pub fn start(sequence: &Sequence, options: &FitOptions) -> Result<Avatar, Error> {
-    let start = &options.recipe.start;
-    let init = SurfaceInit {
-        placement: start.placement,
-        bind_to: start.bind_to,
-        longest_edge: f64::from(options.edge_mm) / 1000.0,
-        scale: start.scale,
-        thickness: start.thickness,
-        opacity: start.opacity,
-        inset: start.inset,
-        sh_degree: 0,
-        refinements: 0,
-        ..SurfaceInit::default()
-    };
-    match start.surface {
-        Surface::Outlines => surface_init(sequence, &init),
-        Surface::Silhouettes => {
-            let settings = ShapeFit {
-                iterations: options.shape_iterations() as usize,
-                seed: options.seed,
-                ..ShapeFit::default()
-            };
+    let Starting { init, shape } = Starting::of(options);
+    match shape {
+        None => surface_init(sequence, &init),
+        Some(settings) => {
             let shape = fit_shape(sequence, &settings, &mut |_| ControlFlow::Continue(()))?;
             if let Ended::NotFinite { iteration, frame } = shape.ended {
                 return Err(Error::Diverged {
@@ -134,7 +156,8 @@ pub fn start(sequence: &Sequence, options: &FitOptions) -> Result<Avatar, Error>
                 });
             }
             let dressed = Sequence { body: Arc::new(shape.body), ..sequence.clone() };
-            surface_init(&dressed, &SurfaceInit { outline_rounds: 0, ..init })
+            let clothing = Clothing { rounds: 0, ..init.clothing };
+            surface_init(&dressed, &SurfaceInit { clothing, ..init })
         }
     }
 }
@@ -147,9 +170,15 @@ impl<'a> Trainer<'a> {
     /// [`gather_texture`](super::texture::gather_texture) for a hybrid.
     pub fn new(sequence: &'a Sequence, options: &'a FitOptions, avatar: Avatar) -> Result<Self, Error> {
         let edge = mean_edge(&sequence.body);
-        let parameters = Parameters::new(avatar, edge, &options.recipe.free);
+        let moments = options.recipe.schedule.moments;
+        let parameters = Parameters::new(avatar, edge, &options.recipe.free, moments);
         let density = Density::new(parameters.len());
-        let layer = options.recipe.mesh.as_ref().map(|mesh| Layer::new(sequence, mesh)).transpose()?;
+        let layer = options
+            .recipe
+            .mesh
+            .as_ref()
+            .map(|mesh| Layer::new(sequence, &options.recipe, mesh))
+            .transpose()?;
         Self::with_state(sequence, options, (parameters, density, layer), 0)
     }
 
@@ -197,6 +226,7 @@ impl<'a> Trainer<'a> {
             layer,
             iteration,
             bound,
+            faces: NearestFace::new(&sequence.body),
             frames: TrainingFrames::new(sequence, options.seed),
             warnings: Vec::new(),
             scratch: Scratch::new(),
@@ -208,10 +238,10 @@ impl<'a> Trainer<'a> {
         self.iteration >= self.options.iterations
     }
 
-    /// True before every fiftieth iteration, when the avatar is bound anew: Gaussians that have moved meet other faces and
+    /// True before every iteration of [`Schedule::between_bindings`](crate::options::Schedule), when the avatar is bound anew: Gaussians that have moved meet other faces and
     /// skinning weights. Only a checkpoint of such a moment continues in the same bits.
     pub fn is_resting(&self) -> bool {
-        self.iteration.is_multiple_of(BETWEEN_BINDINGS)
+        self.iteration.is_multiple_of(self.options.recipe.schedule.between_bindings)
     }
 
     /// The avatar as it stands.
@@ -250,8 +280,8 @@ impl<'a> Trainer<'a> {
         self.parameters.raise_sh_degree(recipe.sh_degree_at(self.iteration, iterations));
         let in_strategy = Error::strategy(self.sequence);
         if self.is_resting() {
-            self.bound =
-                BoundAvatar::new(&self.parameters.avatar, &self.sequence.body).map_err(&in_strategy)?;
+            let avatar = &self.parameters.avatar;
+            self.bound.rebind(avatar, &self.sequence.body, self.faces.as_ref()).map_err(&in_strategy)?;
         } else {
             self.bound.update(&self.parameters.avatar).map_err(&in_strategy)?;
         }
@@ -322,9 +352,11 @@ impl<'a> Trainer<'a> {
         if let Some(settings) = &recipe.densify
             && density::is_due(settings, self.iteration, iterations)
         {
-            density::change(settings, &mut self.parameters, &mut self.density, &self.sequence.body)
+            let (body, faces) = (&self.sequence.body, self.faces.as_ref());
+            density::change(settings, &mut self.parameters, &mut self.density, body, faces)
                 .map_err(Error::scene(self.sequence))?;
-            self.bound = BoundAvatar::new(&self.parameters.avatar, &self.sequence.body)
+            self.bound
+                .rebind(&self.parameters.avatar, body, faces)
                 .map_err(Error::strategy(self.sequence))?;
         }
         Ok(Step {

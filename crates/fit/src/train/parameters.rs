@@ -1,14 +1,12 @@
 //! What an optimiser steps on: the avatar, how a recipe lets it change, and the moments of every group.
 
 use crate::adam::Adam;
+use crate::options::Moments;
 use crate::recipe::{Free, FreePosition, FreeRotation, FreeScale, Recipe};
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::{Avatar, AvatarGradient, Binding, Gaussians};
-
-/// Gradients far below this move nothing (3DGS uses the same).
-const EPSILON: f32 = 1e-15;
 
 /// An avatar that is being fitted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,10 +96,10 @@ impl Origin {
 
 impl Parameters {
     /// Of an avatar before its first iteration; `edge` is the mean edge of the body's faces, metres.
-    pub(super) fn new(avatar: Avatar, edge: f32, free: &Free) -> Self {
+    pub(super) fn new(avatar: Avatar, edge: f32, free: &Free, moments: Moments) -> Self {
         let n = avatar.gaussians.len();
         let along = free.position == FreePosition::AlongNormal;
-        let adam = |len: usize| Adam::new(len).with_epsilon(EPSILON);
+        let adam = |len: usize| Adam::new(len, moments);
         let (position, height) = match &avatar.binding {
             Binding::Face(_) => (if along { 0 } else { 3 * n }, n),
             Binding::Static | Binding::Vertex(_) => (if along { n } else { 3 * n }, 0),

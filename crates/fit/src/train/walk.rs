@@ -6,9 +6,6 @@ use skinsplat_core::scene::body::vertex_normals;
 use skinsplat_core::scene::{FaceBinding, RestBody};
 use std::collections::BTreeMap;
 
-/// A Gaussian crosses at most so many edges at a time.
-const MOST_CROSSINGS: usize = 16;
-
 /// For each side of each face (opposite its corner 0, 1, 2), the face beyond it.
 pub(super) struct Neighbours(Vec<[Option<u32>; 3]>);
 
@@ -74,12 +71,12 @@ fn in_plane([a, b, c]: [DVec3; 3], shift: DVec3) -> [f64; 3] {
     [-beta - gamma, beta, gamma]
 }
 
-/// Moves every Gaussian with a negative coordinate onto the neighbour over that side, until none is negative. At an edge of
-/// the mesh a Gaussian stops.
-pub(super) fn walk(binding: &mut FaceBinding, body: &RestBody, neighbours: &Neighbours) {
+/// Moves every Gaussian with a negative coordinate onto the neighbour over that side, until none is negative or it has crossed
+/// `most_crossings` edges. At an edge of the mesh a Gaussian stops.
+pub(super) fn walk(binding: &mut FaceBinding, body: &RestBody, neighbours: &Neighbours, most_crossings: u32) {
     for i in 0..binding.faces.len() {
         let (mut face, mut place) = (binding.faces[i], binding.barycentric[i].map(f64::from));
-        for _ in 0..MOST_CROSSINGS {
+        for _ in 0..most_crossings {
             let side = (0..3).min_by(|&a, &b| place[a].total_cmp(&place[b])).unwrap_or(0);
             if place[side] >= 0.0 {
                 break;
@@ -171,7 +168,7 @@ mod tests {
         let mut binding =
             FaceBinding { faces: vec![0; 3], barycentric: places.to_vec(), offsets: vec![0.0; 3] };
         let before: Vec<DVec3> = (0..3).map(|i| point(&body, &binding, i)).collect();
-        walk(&mut binding, &body, &Neighbours::new(&body));
+        walk(&mut binding, &body, &Neighbours::new(&body), 16);
         for i in 0..2 {
             assert!(point(&body, &binding, i).distance(before[i]) < 1e-6, "{i}");
         }

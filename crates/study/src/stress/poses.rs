@@ -4,6 +4,7 @@ use super::averages::rotation_error;
 use super::stage;
 use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, shown};
 use glam::{DMat3, DQuat, DVec3, Mat3};
+use rayon::ThreadPool;
 use rayon::prelude::*;
 use skinsplat_core::math::Quaternion;
 use skinsplat_core::math::rotation::{angle_between, multiply};
@@ -66,19 +67,27 @@ struct Outcome {
 struct Stage<'a> {
     body: &'a RestBody,
     bound: &'a BoundAvatar,
-    one: &'a rayon::ThreadPool,
-    two: &'a rayon::ThreadPool,
+    one: Option<&'a ThreadPool>,
+    two: Option<&'a ThreadPool>,
+}
+
+/// Runs on a pool of threads; on that of the program where the system made none.
+fn on<T: Send>(pool: Option<&ThreadPool>, work: impl FnOnce() -> T + Send) -> T {
+    match pool {
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
 }
 
 impl Stage<'_> {
     fn outcome(&self, strategy: &Strategy, at: &Pose) -> Result<Outcome, StrategyError> {
         let body = PosedBody::new(self.body, at)?;
-        let here = self.one.install(|| pose(self.bound, &body, strategy))?;
-        let again = self.two.install(|| pose(self.bound, &body, strategy))?;
+        let here = on(self.one, || pose(self.bound, &body, strategy))?;
+        let again = on(self.two, || pose(self.bound, &body, strategy))?;
         let turn = DQuat::from_scaled_axis(DVec3::new(0.7, -1.1, 0.4));
         let moved = stage::moved(at, turn, DVec3::ZERO);
         let moved = PosedBody::new(self.body, &moved)?;
-        let there = self.one.install(|| pose(self.bound, &moved, strategy))?;
+        let there = on(self.one, || pose(self.bound, &moved, strategy))?;
         let turn = [turn.w, turn.x, turn.y, turn.z];
         let (mut rotation, mut equivariance) = (None, None);
         if let (Some(here), Some(there)) = (&here.rotations, &there.rotations) {
@@ -129,10 +138,8 @@ pub(super) fn run(quick: bool) -> Result<Findings, StrategyError> {
             ..stage::plain(skinsplat_posing::RotationChoice::QuaternionAverage(Default::default()))
         }
     }));
-    let [one, two] = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build());
-    // Without threads there is nothing to compare: the pool of the program serves as both.
-    let (Ok(one), Ok(two)) = (one, two) else { return Ok(Findings::default()) };
-    let stage = Stage { body: &body, bound: &bound, one: &one, two: &two };
+    let [one, two] = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().ok());
+    let stage = Stage { body: &body, bound: &bound, one: one.as_ref(), two: two.as_ref() };
     let mut findings =
         Findings { section: SECTION, title: "Strategies on hard poses", ..Findings::default() };
     let cases: Vec<&Case> = CASES.iter().step_by(if quick { 3 } else { 1 }).collect();

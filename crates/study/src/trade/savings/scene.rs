@@ -4,6 +4,7 @@ use crate::trade::Error;
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::{Avatar, Camera, SceneError};
 use skinsplat_data::Sequence;
+use skinsplat_fit::options::Clothing;
 use skinsplat_fit::surface::{SurfaceInit, surface_init};
 use skinsplat_synthetic::SUBJECTS;
 
@@ -63,7 +64,7 @@ impl Scene {
         let init = SurfaceInit {
             sh_degree: sh::MAX_DEGREE,
             longest_edge: options.edge,
-            outline_rounds: 0,
+            clothing: Clothing { rounds: 0, ..Clothing::default() },
             refinements: 0,
             ..SurfaceInit::default()
         };

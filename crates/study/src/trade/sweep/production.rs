@@ -52,7 +52,7 @@ pub(super) fn strategies(bench: &Bench) -> Result<Sweep, Error> {
     Ok(Sweep {
         id: "strategy",
         title: "Rotation strategy",
-        about: "All Gaussians of a frame posed by the program, SH rotated: what a strategy costs where 16 Gaussians share an \
+        about: "All Gaussians of a frame posed by the program, SH rotated: what a strategy costs where 8 Gaussians share an \
                 instruction. The closed form and the matrix projections use lanes; other solvers run one by one."
             .to_owned(),
         axes: vec!["Rotation"],
