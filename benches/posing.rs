@@ -11,9 +11,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use glam::{Mat3, Vec3};
 use skinsplat_core::scene::{AvatarGradient, Binding, Posed, PosedBody, PosedGradient};
 use skinsplat_posing::needs::{Needs, PoseBounds};
-use skinsplat_posing::{
-    BoundAvatar, PRESETS, PoseBuffers, Strategy, pose, pose_backward, pose_into,
-};
+use skinsplat_posing::{BoundAvatar, PRESETS, PoseOptions, Poser, Strategy, pose};
 use std::hint::black_box;
 
 fn posing(c: &mut Criterion) {
@@ -31,17 +29,18 @@ fn posing(c: &mut Criterion) {
             each_preset(c, &format!("pose/{case}"), bound.len(), |strategy| {
                 black_box(pose(&bound, &posed_body, strategy).unwrap());
             });
-            let mut buffers = PoseBuffers::default();
+            let (mut poser, options) = (Poser::new(), PoseOptions::default());
             each_preset(c, &format!("pose-into/{case}"), bound.len(), |strategy| {
-                let posed = pose_into(&bound, &posed_body, strategy, &mut buffers).unwrap();
-                buffers.reclaim(black_box(posed));
+                black_box(poser.pose(&bound, &posed_body, strategy, &options).unwrap());
             });
-            let upstream = upstream(&pose(&bound, &posed_body, &PRESETS[0].strategy).unwrap());
+            let upstream = upstream(&pose(&bound, &posed_body, &PRESETS[0].strategy).unwrap().as_posed());
             let mut gradient = AvatarGradient::default();
             gradient.reset(&avatar.gaussians, matches!(avatar.binding, Binding::Face(_)));
             each_preset(c, &format!("pose-backward/{case}"), bound.len(), |strategy| {
                 let gaussians = &avatar.gaussians;
-                pose_backward(&bound, &posed_body, strategy, gaussians, &upstream, &mut gradient).unwrap();
+                poser
+                    .backward(&bound, &posed_body, strategy, &options, gaussians, &upstream, &mut gradient)
+                    .unwrap();
             });
         }
     }
@@ -82,12 +81,11 @@ fn candidates(c: &mut Criterion) {
     let mut group = c.benchmark_group("candidates");
     group.throughput(Throughput::Elements(bound.len() as u64));
     for rotation in Needs::listed() {
-        let (strategy, mut buffers) = (Strategy { rotation, ..base }, PoseBuffers::default());
+        let (strategy, mut poser) = (Strategy { rotation, ..base }, Poser::new());
         group.bench_function(BenchmarkId::from_parameter(rotation), |b| {
             one_thread.install(|| {
                 b.iter(|| {
-                    let posed = pose_into(&bound, &posed_body, &strategy, &mut buffers).unwrap();
-                    buffers.reclaim(black_box(posed));
+                    black_box(poser.pose(&bound, &posed_body, &strategy, &PoseOptions::default()).unwrap());
                 });
             });
         });

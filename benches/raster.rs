@@ -17,7 +17,9 @@ mod splat_scene;
 
 use criterion::Criterion;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use skinsplat_core::scene::{Camera, Gaussians, Image, Posed, PosedGradient, Rendered, RenderedGradient};
+use skinsplat_core::scene::{
+    Camera, Gaussians, Image, OwnedPosed, Posed, PosedGradient, Rendered, RenderedGradient,
+};
 use skinsplat_render::splat::{Derivatives, Phase, PhaseTimes, RenderSettings, Renderer, SimdLevel};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -42,7 +44,8 @@ fn main() {
     for scene in ["S", "M", "L"] {
         let views: Vec<_> = cameras.iter().filter(|(view, ..)| chosen(&format!("{scene} {view}"))).collect();
         let Some(gaussians) = (!views.is_empty()).then(|| gaussians(scene)).flatten() else { continue };
-        let posed = Posed::from_static(&gaussians);
+        let posed = OwnedPosed::from_static(&gaussians);
+        let posed = posed.as_posed();
         for (view, camera, settings) in views {
             for threads in [1, 2] {
                 let frame = Frame { level, posed: &posed, camera, settings };
@@ -60,7 +63,8 @@ fn criterion(cameras: &[(String, Camera, RenderSettings)]) {
     let mut criterion = Criterion::default().sample_size(30).configure_from_args();
     for (scene, view) in [("S", "front_512"), ("M", "front_1024")] {
         let Some(gaussians) = gaussians(scene) else { continue };
-        let posed = Posed::from_static(&gaussians);
+        let posed = OwnedPosed::from_static(&gaussians);
+        let posed = posed.as_posed();
         let (_, camera, settings) = cameras.iter().find(|(name, ..)| name == view).unwrap();
         let mut renderer = Renderer::new();
         let mut rendered = renderer.render(&posed, camera, settings);

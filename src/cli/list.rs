@@ -71,10 +71,10 @@ fn experiments() -> Result<Vec<[String; 2]>> {
 }
 
 fn strategies() -> Vec<[String; 2]> {
-    PRESETS
-        .iter()
-        .map(|p| [p.id.to_owned(), format!("{}: {} [{}]", p.title, p.summary, p.strategy)])
-        .collect()
+    let presets = PRESETS.iter().map(|p| [p.id.to_owned(), format!("{}: {}", p.title, p.summary)]);
+    let variations =
+        skinsplat_posing::variations().into_iter().map(|v| [format!("+{}", v.spec), v.summary.to_owned()]);
+    presets.chain(variations).collect()
 }
 
 fn recipes() -> Vec<[String; 2]> {

@@ -1,9 +1,9 @@
 //! An avatar, a body, a frame of a pose track and a strategy: the arguments of `render` and `skin`.
 
 use anyhow::{Context as _, Result, bail};
-use skinsplat_core::scene::{Avatar, Binding, Body, Camera, Pose, Posed, PosedBody, RestBody};
+use skinsplat_core::scene::{Avatar, Binding, Body, Camera, OwnedPosed, Pose, Posed, PosedBody, RestBody};
 use skinsplat_data::{body, ply, poses};
-use skinsplat_posing::{BoundAvatar, JointLift, PoseBuffers, Strategy};
+use skinsplat_posing::{BoundAvatar, JointLift, PoseOptions, Poser, Strategy};
 use std::path::{Path, PathBuf};
 
 /// Which pose to take, and how to rotate the Gaussians.
@@ -100,30 +100,28 @@ impl Subject {
         &self,
         strategy: &Strategy,
         camera: Option<&Camera>,
-        use_posed: impl FnOnce(&Posed) -> Result<T>,
+        use_posed: impl FnOnce(&Posed<'_>) -> Result<T>,
     ) -> Result<T> {
         let Some((rest, pose)) = &self.rest else {
-            return use_posed(&Posed::from_static(&self.avatar.gaussians));
+            return use_posed(&OwnedPosed::from_static(&self.avatar.gaussians).as_posed());
         };
-        let bound = BoundAvatar::new(&self.avatar, rest)?;
+        let mut bound = BoundAvatar::new(&self.avatar, rest)?;
+        if camera.is_some() {
+            bound = bound.without_zero_bands();
+        }
         let body = PosedBody::new(rest, pose)?;
-        let Some(camera) = camera else {
-            return use_posed(&skinsplat_posing::pose(&bound, &body, strategy)?);
-        };
-        let bound = bound.without_zero_bands();
-        let mut buffers = PoseBuffers::default();
-        let posed = skinsplat_posing::pose_seen(&bound, &body, strategy, camera, &mut buffers)?;
-        use_posed(&posed)
+        let options = PoseOptions { seen_by: camera, ..PoseOptions::default() };
+        use_posed(&Poser::new().pose(&bound, &body, strategy, &options)?)
     }
 
     /// [`Subject::posed`] with the signs of joint quaternions followed through the track, from its first pose to this one.
     pub(super) fn posed_following<T>(
         &self,
         strategy: &Strategy,
-        use_posed: impl FnOnce(&Posed) -> Result<T>,
+        use_posed: impl FnOnce(&Posed<'_>) -> Result<T>,
     ) -> Result<T> {
         let Some((rest, pose)) = &self.rest else {
-            return use_posed(&Posed::from_static(&self.avatar.gaussians));
+            return use_posed(&OwnedPosed::from_static(&self.avatar.gaussians).as_posed());
         };
         let mut lift: Option<JointLift> = None;
         for earlier in &self.before {
@@ -132,12 +130,7 @@ impl Subject {
         let body = PosedBody::new(rest, pose)?;
         let lift = JointLift::next(lift.as_ref(), &body);
         let bound = BoundAvatar::new(&self.avatar, rest)?;
-        use_posed(&skinsplat_posing::pose_lifted(
-            &bound,
-            &body,
-            strategy,
-            &lift,
-            &mut PoseBuffers::default(),
-        )?)
+        let options = PoseOptions { lift: Some(&lift), ..PoseOptions::default() };
+        use_posed(&Poser::new().pose(&bound, &body, strategy, &options)?)
     }
 }

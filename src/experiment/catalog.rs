@@ -1,7 +1,7 @@
 //! Protocols and strategies by their specs: the one place where experiments meet the layers that define them.
 
 use skinsplat_metrics::{MetricsError, Protocol};
-use skinsplat_posing::{Strategy, StrategyError};
+use skinsplat_posing::{PosingError, Strategy};
 
 /// The protocol of a spec.
 ///
@@ -22,10 +22,10 @@ pub(super) fn strategy(spec: &str) -> Result<Strategy, (String, String)> {
     spec.parse().map_err(|error| explained(spec, error))
 }
 
-fn explained(spec: &str, error: StrategyError) -> (String, String) {
+fn explained(spec: &str, error: PosingError) -> (String, String) {
     match error {
-        StrategyError::UnknownId { axis, id, expected } => (format!("unknown {axis} `{id}`"), expected),
-        StrategyError::BadVariation { part, expected } => (format!("`{part}`"), expected),
+        PosingError::UnknownId { axis, id, expected } => (format!("unknown {axis} `{id}`"), expected),
+        PosingError::BadVariation { part, expected } => (format!("`{part}`"), expected),
         other => (format!("`{spec}`: {other}"), "a valid strategy".to_owned()),
     }
 }

@@ -16,7 +16,7 @@ pub enum Error {
     Fit(#[from] skinsplat_fit::Error),
     /// An avatar that cannot be posed.
     #[error(transparent)]
-    Strategy(#[from] skinsplat_posing::StrategyError),
+    Strategy(#[from] skinsplat_posing::PosingError),
     /// A pose or an image that breaks an invariant.
     #[error(transparent)]
     Scene(#[from] skinsplat_core::scene::SceneError),

@@ -7,7 +7,7 @@ use skinsplat_core::scene::{Camera, Image, Mask, Pose, Posed, PosedBody, Rendere
 use skinsplat_data::{Sequence, Truth};
 use skinsplat_fit::texture::{SAMPLES, TexturedBody};
 use skinsplat_metrics::Protocol;
-use skinsplat_posing::{PoseBuffers, Strategy};
+use skinsplat_posing::{PoseOptions, Poser, Strategy};
 use skinsplat_render::mesh::SamplePattern;
 use skinsplat_render::splat::{RenderSettings, Renderer};
 use std::time::Instant;
@@ -51,13 +51,9 @@ impl<'a> Frame<'a> {
         };
         let strategy: Strategy = variant.strategy.as_deref().unwrap_or_default().parse()?;
         let start = Instant::now();
-        let posed = skinsplat_posing::pose_seen(
-            bound,
-            &self.body,
-            &strategy,
-            self.camera,
-            &mut PoseBuffers::default(),
-        )?;
+        let mut poser = Poser::new();
+        let options = PoseOptions { seen_by: Some(self.camera), ..PoseOptions::default() };
+        let posed = poser.pose(bound, &self.body, &strategy, &options)?;
         seconds.pose = start.elapsed().as_secs_f64();
         let settings = RenderSettings { background, antialiased: job.antialiased };
         let start = Instant::now();

@@ -9,7 +9,7 @@ use skinsplat_data::Sequence;
 use skinsplat_fit::texture::TexturedBody;
 use skinsplat_fit::train::Fitted;
 use skinsplat_metrics::{Protocol, Wanted};
-use skinsplat_posing::{BoundAvatar, PoseBuffers, Strategy, pose_seen};
+use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
 use skinsplat_render::splat::{RenderSettings, Renderer};
 use std::sync::Arc;
 
@@ -64,7 +64,9 @@ fn of_sequence(
         let frame = &sequence.frames[index];
         let (pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
         let body = PosedBody::with_rotations(&sequence.body, pose, |joint| read[joint])?;
-        let posed = pose_seen(bound, &body, strategy, camera, &mut PoseBuffers::default())?;
+        let mut poser = Poser::new();
+        let options = PoseOptions { seen_by: Some(camera), ..PoseOptions::default() };
+        let posed = poser.pose(bound, &body, strategy, &options)?;
         let image = match mesh {
             None => renderer.render(&posed, camera, &settings).image,
             Some(mesh) => together(renderer, &posed, (mesh, pose), camera, &settings)?.image,

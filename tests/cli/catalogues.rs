@@ -92,6 +92,10 @@ fn list_names_everything_that_can_be_chosen() {
     let here = desk.ok(args!["list", "datasets", "--data", data("blender")]);
     assert_eq!(here.lines().count(), 3, "{here}");
     assert!(here.lines().all(|line| line.ends_with("available")), "{here}");
+    let strategies = desk.ok(args!["list", "strategies"]);
+    for variation in ["+rotation=lifted-sum ", "+rotation=power-N[-START] ", "+colour=view-rotation "] {
+        assert!(strategies.lines().any(|line| line.starts_with(variation)), "{variation}: {strategies}");
+    }
     // What is listed as a strategy can be asked for by that spec.
     for preset in skinsplat_posing::PRESETS {
         assert!(preset.strategy.to_string().parse::<skinsplat_posing::Strategy>().is_ok(), "{}", preset.id);

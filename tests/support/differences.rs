@@ -3,14 +3,14 @@
 #![allow(clippy::print_stdout, reason = "tests; the agreement is printed")]
 
 use glam::Mat3;
-use skinsplat_core::scene::{Posed, PosedGradient};
+use skinsplat_core::scene::{OwnedPosed, PosedGradient};
 
 /// The central difference of a loss along one number of `posed`.
 pub fn difference(
-    posed: &Posed<'static>,
-    loss: impl Fn(&Posed<'static>) -> f64,
+    posed: &OwnedPosed,
+    loss: impl Fn(&OwnedPosed) -> f64,
     step: f32,
-    number: impl for<'a> Fn(&'a mut Posed<'static>) -> &'a mut f32,
+    number: impl for<'a> Fn(&'a mut OwnedPosed) -> &'a mut f32,
 ) -> f64 {
     let moved = |by: f32| {
         let mut posed = posed.clone();
@@ -33,21 +33,16 @@ pub fn assert_close(name: &str, found: &[f32], expected: &[f64], tolerance: f64)
 
 /// Fails unless the gradient is that of the loss, for every kind of parameter.
 #[track_caller]
-pub fn assert_gradient(
-    posed: &Posed<'static>,
-    gradient: &PosedGradient,
-    loss: impl Fn(&Posed<'static>) -> f64,
-) {
+pub fn assert_gradient(posed: &OwnedPosed, gradient: &PosedGradient, loss: impl Fn(&OwnedPosed) -> f64) {
     let n = posed.len();
-    let along = |step, number: &dyn for<'a> Fn(&'a mut Posed<'static>) -> &'a mut f32| {
+    let along = |step, number: &dyn for<'a> Fn(&'a mut OwnedPosed) -> &'a mut f32| {
         difference(posed, &loss, step, number)
     };
     let means: Vec<f64> = (0..3 * n).map(|i| along(1e-5, &|p| &mut p.means[i / 3][i % 3])).collect();
     let factors: Vec<f64> =
         (0..9 * n).map(|i| along(1e-6, &|p| &mut p.factors[i / 9].col_mut(i % 9 / 3)[i % 3])).collect();
-    let opacities: Vec<f64> = (0..n).map(|i| along(1e-4, &|p| &mut p.opacities.to_mut()[i])).collect();
-    let sh: Vec<f64> =
-        (0..3 * posed.sh.len()).map(|i| along(1e-4, &|p| &mut p.sh.to_mut()[i / 3][i % 3])).collect();
+    let opacities: Vec<f64> = (0..n).map(|i| along(1e-4, &|p| &mut p.opacities[i])).collect();
+    let sh: Vec<f64> = (0..3 * posed.sh.len()).map(|i| along(1e-4, &|p| &mut p.sh[i / 3][i % 3])).collect();
     let found: Vec<f32> = gradient.means.iter().flat_map(|v| v.to_array()).collect();
     assert_close("means", &found, &means, 1e-5);
     let found: Vec<f32> = gradient.factors.iter().flat_map(Mat3::to_cols_array).collect();

@@ -2,9 +2,11 @@
 
 use super::rig;
 use glam::Mat3;
-use skinsplat_core::scene::{Avatar, AvatarGradient, Binding, FaceBinding, Posed, PosedBody, PosedGradient};
+use skinsplat_core::scene::{
+    Avatar, AvatarGradient, Binding, FaceBinding, OwnedPosed, PosedBody, PosedGradient,
+};
 use skinsplat_posing::{
-    BoundAvatar, CovarianceChoice, LbsProjection, RotationChoice, Strategy, pose, pose_backward,
+    BoundAvatar, CovarianceChoice, LbsProjection, PoseOptions, Poser, RotationChoice, Strategy, pose,
 };
 
 /// A parameter that every Gaussian has.
@@ -72,10 +74,10 @@ impl Parameter {
 }
 
 /// A gradient at every entry of a pose, of such sizes that every kind of output counts.
-pub(crate) fn upstream(posed: &Posed<'_>, seed: u64) -> PosedGradient {
+pub(crate) fn upstream(posed: &OwnedPosed, seed: u64) -> PosedGradient {
     let mut noise = rig::Noise(seed);
     let mut gradient = PosedGradient::default();
-    gradient.reset(posed);
+    gradient.reset(&posed.as_posed());
     gradient.means.iter_mut().for_each(|g| *g = noise.vector().as_vec3());
     for g in &mut gradient.factors {
         let [a, b, c] = [0; 3].map(|_| noise.vector().as_vec3() * 100.0);
@@ -87,7 +89,7 @@ pub(crate) fn upstream(posed: &Posed<'_>, seed: u64) -> PosedGradient {
 }
 
 /// Per Gaussian, what the upstream gradient is a derivative of.
-fn losses(posed: &Posed<'_>, upstream: &PosedGradient, means_only: bool) -> Vec<f64> {
+fn losses(posed: &OwnedPosed, upstream: &PosedGradient, means_only: bool) -> Vec<f64> {
     let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>();
     let count = (posed.sh_degree + 1).pow(2);
     let loss = |i: usize| {
@@ -121,7 +123,10 @@ impl<'a> Case<'a> {
         let mut gradient = AvatarGradient::default();
         gradient.reset(&self.avatar.gaussians, matches!(self.avatar.binding, Binding::Face(_)));
         let Self { bound, body, avatar } = self;
-        pose_backward(bound, body, strategy, &avatar.gaussians, upstream, &mut gradient).unwrap();
+        let options = PoseOptions::default();
+        Poser::new()
+            .backward(bound, body, strategy, &options, &avatar.gaussians, upstream, &mut gradient)
+            .unwrap();
         gradient
     }
 

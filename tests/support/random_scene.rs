@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub, reason = "shared by tests")]
 
 use glam::{DMat3, DMat4, DVec3, Mat3, Quat, Vec3};
-use skinsplat_core::scene::{Camera, ColourClamp, Posed};
+use skinsplat_core::scene::{Camera, ColourClamp, OwnedPosed};
 
 /// SplitMix64.
 pub struct Random(pub u64);
@@ -54,7 +54,7 @@ pub fn camera(random: &mut Random, width: u32, height: u32) -> Camera {
 }
 
 /// Gaussians about the origin, some of them behind the cameras of [`camera`].
-pub fn posed(random: &mut Random, count: usize) -> Posed<'static> {
+pub fn posed(random: &mut Random, count: usize) -> OwnedPosed {
     let sh_degree = random.below(4);
     let coefficients = (sh_degree + 1) * (sh_degree + 1);
     let means = (0..count)
@@ -77,27 +77,18 @@ pub fn posed(random: &mut Random, count: usize) -> Posed<'static> {
     let framed = random.below(2) == 0;
     let view_frames = framed.then(|| (0..count).map(|_| Mat3::from_quat(random.rotation())).collect());
     let colour_clamp = [ColourClamp::NonNegative, ColourClamp::Unit][random.below(2)];
-    Posed {
-        means,
-        factors,
-        opacities: opacities.into(),
-        sh_degree,
-        sh: sh.into(),
-        view_frames,
-        colour_clamp,
-        rotations: None,
-    }
+    OwnedPosed { means, factors, opacities, sh_degree, sh, view_frames, colour_clamp, rotations: None }
 }
 
 /// The Gaussians with these indices, in this order.
-pub fn chosen(posed: &Posed, indices: &[usize]) -> Posed<'static> {
+pub fn chosen(posed: &OwnedPosed, indices: &[usize]) -> OwnedPosed {
     let k = (posed.sh_degree + 1).pow(2);
-    Posed {
+    OwnedPosed {
         means: indices.iter().map(|&i| posed.means[i]).collect(),
         factors: indices.iter().map(|&i| posed.factors[i]).collect(),
-        opacities: indices.iter().map(|&i| posed.opacities[i]).collect::<Vec<_>>().into(),
+        opacities: indices.iter().map(|&i| posed.opacities[i]).collect(),
         sh_degree: posed.sh_degree,
-        sh: indices.iter().flat_map(|&i| posed.sh[i * k..(i + 1) * k].to_vec()).collect::<Vec<_>>().into(),
+        sh: indices.iter().flat_map(|&i| posed.sh[i * k..(i + 1) * k].to_vec()).collect(),
         view_frames: posed.view_frames.as_ref().map(|f| indices.iter().map(|&i| f[i]).collect()),
         colour_clamp: posed.colour_clamp,
         rotations: None,

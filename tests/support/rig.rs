@@ -130,7 +130,7 @@ pub(crate) fn strategies() -> Vec<Strategy> {
     // Seeds of tests follow the order: new choices come last.
     let is_new = |rotation: &RotationChoice| *rotation == RotationChoice::LiftedSum;
     let mut rotations: Vec<RotationChoice> =
-        RotationChoice::NAMED.into_iter().filter(|rotation| !is_new(rotation)).collect();
+        RotationChoice::named().filter(|rotation| !is_new(rotation)).collect();
     for id in ["closed-form", "eigen", "polar", "power-15", "nlerp", "squaring-6", "vertex-average-eigen"] {
         rotations.push(id.parse().unwrap());
     }
@@ -142,7 +142,7 @@ pub(crate) fn strategies() -> Vec<Strategy> {
         all.extend(ColourChoice::ALL.map(|colour| Strategy { colour, ..preset.strategy }));
         all.extend(CovarianceChoice::ALL.map(|covariance| Strategy { covariance, ..preset.strategy }));
     }
-    for rotation in RotationChoice::NAMED.into_iter().filter(is_new) {
+    for rotation in RotationChoice::named().filter(is_new) {
         all.extend(variants(rotation));
     }
     all

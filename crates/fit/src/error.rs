@@ -1,7 +1,7 @@
 //! What can go wrong when an avatar is made.
 
 use skinsplat_core::scene::SceneError;
-use skinsplat_posing::StrategyError;
+use skinsplat_posing::PosingError;
 
 /// An avatar could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -23,7 +23,7 @@ pub enum Error {
         /// Id of the sequence.
         sequence: String,
         /// What is wrong.
-        source: StrategyError,
+        source: PosingError,
     },
     /// An optimisation ran into numbers that are not finite.
     #[error(
@@ -63,7 +63,7 @@ impl Error {
 
     pub(super) fn strategy(
         sequence: &skinsplat_data::sequence::Sequence,
-    ) -> impl Fn(StrategyError) -> Self + '_ {
+    ) -> impl Fn(PosingError) -> Self + '_ {
         |source| Self::Strategy { sequence: sequence.id.clone(), source }
     }
 

@@ -177,7 +177,7 @@ fn refine(
         let bound = BoundAvatar::new(&avatar, &sequence.body).map_err(Error::strategy(sequence))?;
         let residual = |frame: &Frame<'_>| {
             let posed = pose(&bound, &frame.body, &strategy).map_err(Error::strategy(sequence))?;
-            let mut image = render(&posed, frame.camera, &settings).image;
+            let mut image = render(&posed.as_posed(), frame.camera, &settings).image;
             let truth = &frame.truth;
             let truth =
                 truth.rgb.composited(&truth.alpha, settings.background).map_err(Error::scene(sequence))?;
@@ -237,11 +237,7 @@ impl Layout {
                 points_on_faces(faces.len()),
             ),
         };
-        let weights = sites.iter().map(|site| {
-            let corners = body.faces[site.face as usize];
-            let share = |k: usize| (corners[k] as usize, f64::from(site.barycentric[k]));
-            body.weights.mixed(&[share(0), share(1), share(2)])
-        });
+        let weights = sites.iter().map(|site| body.weights_at(site.face, site.barycentric.map(f64::from)));
         let skin = SkinWeights::from_rows(weights, body.skeleton.num_joints())?;
         let parts = Parts { points, offsets, members, skin: Some(skin) };
         Ok(Self { discs, sites, parts, neighbours, pixel: pixel_on_surface(sequence)? })

@@ -3,60 +3,31 @@
 //!
 //! [`Posed`]: skinsplat_core::scene::Posed
 
-use super::bound::{Moves, expect_count};
-use super::covariance;
+use super::bound::Moves;
+use super::error::expect_count;
 use super::frame::{Frame, Visitor};
-use super::layout::{Block, CHUNK, LANES, Lanes};
-use super::rotate::{self, BlockInput, Turn, put, take};
+use super::lanes::{self, LANES, Lanes, put, take};
+use super::layout::{Block, CHUNK};
+use super::rotate::{BlockInput, Rotated, means_adjoint, rotation_adjoint};
 use super::surfel::Disc;
-use super::{BoundAvatar, ColourChoice, CovarianceChoice, Strategy, StrategyError, colour};
+use super::{BoundAvatar, ColourChoice, CovarianceChoice, PosingError, colour, covariance};
 use glam::Vec3;
 use rayon::prelude::*;
 use skinsplat_core::math::{Quaternion, dot4, rotation};
-use skinsplat_core::scene::{AvatarGradient, Gaussians, PosedBody, PosedGradient, SceneError};
+use skinsplat_core::scene::{AvatarGradient, Gaussians, PosedGradient, SceneError};
 
-/// Adds to `gradient` what a pose contributes, so that the frames of a batch sum in the order of the calls: the transposed
-/// derivative of [`pose`](super::pose()) applied to `upstream`. `gaussians` are those that `bound` was made of or last
-/// updated with; `gradient` is one that [`AvatarGradient::reset`] made for them.
-///
-/// Exact for every strategy, piecewise where a strategy chooses (the branch of a matrix-to-quaternion conversion, the
-/// thin axis of a disc). Two dependencies are left out, as the stock methods leave them out or because [`PosedGradient`]
-/// has no place for them:
-/// * barycentric coordinates move the position only, neither the skinning weights mixed with them nor a vertex average;
-/// * frames in which view directions are read do not follow parameters (only those of a conversion of B R_c could).
-///
-/// The result is the same, bit for bit, for any number of threads and any width of vector instructions.
-///
-/// # Errors
-/// Those of [`pose`](super::pose()), and [`StrategyError::Scene`] for arrays whose length does not fit the bound avatar.
-/// Nothing was added then.
-pub fn pose_backward(
-    bound: &BoundAvatar,
-    body: &PosedBody<'_>,
-    strategy: &Strategy,
+/// Adds to `gradient` what the pose of a frame contributes. See [`Poser::backward`](super::Poser::backward).
+pub(super) fn add(
+    frame: &Frame<'_>,
     gaussians: &Gaussians,
     upstream: &PosedGradient,
     gradient: &mut AvatarGradient,
-) -> Result<(), StrategyError> {
-    backward_on(pulp::Arch::new(), bound, body, strategy, gaussians, upstream, gradient)
-}
-
-/// [`pose_backward`] with the instructions of one kind of processor.
-pub(super) fn backward_on(
-    arch: pulp::Arch,
-    bound: &BoundAvatar,
-    body: &PosedBody<'_>,
-    strategy: &Strategy,
-    gaussians: &Gaussians,
-    upstream: &PosedGradient,
-    gradient: &mut AvatarGradient,
-) -> Result<(), StrategyError> {
-    let frame = Frame::new(arch, bound, body, strategy, None)?;
-    check(bound, gaussians, upstream, gradient)?;
-    let parts = Part::split(gradient, bound.sh_count());
+) -> Result<(), PosingError> {
+    check(frame.bound, gaussians, upstream, gradient)?;
+    let parts = Part::split(gradient, frame.bound.sh_count());
     parts.into_par_iter().enumerate().for_each(|(number, gradient)| {
         let start = number * CHUNK;
-        AdjointChunk { frame: &frame, gaussians, upstream, number, start, gradient, turns: Vec::new() }.run();
+        AdjointChunk { frame, gaussians, upstream, number, start, gradient, relative: Vec::new() }.run();
     });
     Ok(())
 }
@@ -79,9 +50,9 @@ fn check(
     expect_count("gradient of scale", gradient.log_scales.len(), n)?;
     expect_count("gradient of opacity", gradient.opacity_logits.len(), n)?;
     expect_count("gradient of f_dc/f_rest", gradient.sh.len(), coefficients)?;
-    let seated = if bound.moves == Moves::WithFaces { n } else { 0 };
-    expect_count("gradient of barycentric", gradient.barycentric.len(), seated)?;
-    expect_count("gradient of offset", gradient.offsets.len(), seated)
+    let embedded = if bound.moves == Moves::WithFaces { n } else { 0 };
+    expect_count("gradient of barycentric", gradient.barycentric.len(), embedded)?;
+    expect_count("gradient of offset", gradient.offsets.len(), embedded)
 }
 
 /// One chunk's part of an [`AvatarGradient`].
@@ -131,7 +102,7 @@ struct AdjointChunk<'f, 'a, 'o> {
     start: usize,
     gradient: Part<'o>,
     /// R of each Gaussian, for the SH; empty if they stay.
-    turns: Vec<Quaternion<f32>>,
+    relative: Vec<Quaternion<f32>>,
 }
 
 impl AdjointChunk<'_, '_, '_> {
@@ -139,11 +110,11 @@ impl AdjointChunk<'_, '_, '_> {
     fn run(mut self) {
         let frame = self.frame;
         if self.rotates_sh() {
-            self.turns.resize(self.gradient.means.len(), [0.0; 4]);
+            self.relative.resize(self.gradient.means.len(), [0.0; 4]);
         }
         let chunk = &frame.bound.chunks(frame.strategy.covariance)[self.number];
         frame.walk(chunk, self.start, &mut self);
-        self.seats();
+        self.embeddings();
         self.opacities();
         self.sh();
     }
@@ -154,17 +125,17 @@ impl AdjointChunk<'_, '_, '_> {
 
     /// Barycentric coordinates and offsets, through the point on the posed mesh, or on the rest mesh where the face
     /// carries that along.
-    fn seats(&mut self) {
+    fn embeddings(&mut self) {
         let Frame { bound, body, .. } = self.frame;
         let (Moves::WithFaces, Some(surface)) = (bound.moves, &bound.surface) else { return };
         let mesh = body.mesh();
         let places = self.gradient.barycentric.iter_mut().zip(self.gradient.offsets.iter_mut());
         for (i, (barycentric, offset)) in places.enumerate() {
             let gaussian = self.start + i;
-            let (seat, of_mean) = (&surface.seats[gaussian], self.upstream.means[gaussian]);
+            let (embedding, of_mean) = (&surface.embeddings[gaussian], self.upstream.means[gaussian]);
             let (of_barycentric, of_offset) = match self.frame.face_motion(gaussian) {
-                Some(motion) => seat.point_adjoint(&surface.faces.mesh, motion.adjoint(of_mean)),
-                None => seat.point_adjoint(mesh, of_mean),
+                Some(motion) => embedding.point_adjoint(&surface.faces.mesh, motion.adjoint(of_mean)),
+                None => embedding.point_adjoint(mesh, of_mean),
             };
             barycentric.iter_mut().zip(of_barycentric).for_each(|(sum, own)| *sum += own);
             *offset += of_offset;
@@ -183,12 +154,12 @@ impl AdjointChunk<'_, '_, '_> {
     fn sh(&mut self) {
         let (degree, count) = (self.frame.bound.sh_degree, self.frame.bound.sh_count());
         let upstream = &self.upstream.sh[self.start * count..][..self.gradient.sh.len()];
-        if self.turns.is_empty() {
+        if self.relative.is_empty() {
             return colour::add_sh(upstream, self.gradient.sh);
         }
         let values = upstream.chunks_exact(count).zip(self.gradient.sh.chunks_exact_mut(count));
-        for (turn, (upstream, gradient)) in self.turns.iter().zip(values) {
-            colour::rotate_sh_adjoint(*turn, degree, upstream, gradient);
+        for (quat, (upstream, gradient)) in self.relative.iter().zip(values) {
+            colour::rotate_sh_adjoint(*quat, degree, upstream, gradient);
         }
     }
 
@@ -209,7 +180,7 @@ impl AdjointChunk<'_, '_, '_> {
 
     /// The derivatives with respect to canonical means.
     #[inline(always)]
-    fn of_means(&self, input: &BlockInput<'_>, turn: &Turn) -> [Lanes; 3] {
+    fn of_means(&self, input: &BlockInput<'_>, rotated: &Rotated) -> [Lanes; 3] {
         let mut gathered = [[0.0; LANES]; 3];
         if self.frame.bound.moves == Moves::WithFaces {
             return gathered;
@@ -220,12 +191,12 @@ impl AdjointChunk<'_, '_, '_> {
                 gathered[axis][lane] = own[axis];
             }
         }
-        match (self.frame.bound.moves, &turn.means) {
+        match (self.frame.bound.moves, &rotated.means) {
             (Moves::Not | Moves::WithFaces, _) => gathered,
-            (Moves::ByWeights, Some(_)) => rotate::means_adjoint(turn, &gathered),
+            (Moves::ByWeights, Some(_)) => means_adjoint(rotated, &gathered),
             (Moves::ByWeights, None) => {
                 let mut means = input.blend.transform_adjoint(&gathered);
-                if self.frame.scales_with_faces() {
+                if self.frame.source.scaled_faces().is_some() {
                     self.of_carried_means(input, &mut means);
                 }
                 means
@@ -248,31 +219,36 @@ impl AdjointChunk<'_, '_, '_> {
     /// The derivatives with respect to canonical unit quaternions, from those of the covariance: with respect to the
     /// posed ones where it is rotated, to the canonical ones where it is deformed.
     #[inline(always)]
-    fn of_rotations(&self, input: &BlockInput<'_>, turn: &Turn, of_covariance: &[Lanes; 4]) -> [Lanes; 4] {
+    fn of_rotations(
+        &self,
+        input: &BlockInput<'_>,
+        rotated: &Rotated,
+        of_covariance: &[Lanes; 4],
+    ) -> [Lanes; 4] {
         let source = &self.frame.source;
-        let torque = (self.frame.converts() && self.rotates_sh()).then(|| self.torque(input, turn));
+        let torque = (source.converts() && self.rotates_sh()).then(|| self.torque(input, rotated));
         match (self.frame.strategy.covariance, torque) {
             (CovarianceChoice::Rotate | CovarianceChoice::Surfel, torque) => {
-                rotate::turn_adjoint(source, input, turn, of_covariance, torque.as_ref())
+                rotation_adjoint(source, input, rotated, of_covariance, torque.as_ref())
             }
             (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, None) => *of_covariance,
             (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, torque) => {
                 let none = [[0.0; LANES]; 4];
-                let of_colour = rotate::turn_adjoint(source, input, turn, &none, torque.as_ref());
-                rotate::sum(of_covariance, &of_colour)
+                let of_colour = rotation_adjoint(source, input, rotated, &none, torque.as_ref());
+                lanes::sum(of_covariance, &of_colour)
             }
         }
     }
 
-    /// How the loss changes if R turns on, where R depends on R_c and SH turn with R.
+    /// How the loss changes if R rotates on, where R depends on R_c and SH rotate with R.
     #[inline(never)]
-    fn torque(&self, input: &BlockInput<'_>, turn: &Turn) -> [Lanes; 3] {
+    fn torque(&self, input: &BlockInput<'_>, rotated: &Rotated) -> [Lanes; 3] {
         let mut torque = [[0.0; LANES]; 3];
         let (degree, count) = (self.frame.bound.sh_degree, self.frame.bound.sh_count());
         for lane in 0..LANES {
             let range = input.gaussian(lane) * count..(input.gaussian(lane) + 1) * count;
             let (own, upstream) = (&self.frame.bound.sh[range.clone()], &self.upstream.sh[range]);
-            let of_lane = colour::sh_torque(take(&turn.relative, lane), degree, own, upstream);
+            let of_lane = colour::sh_torque(take(&rotated.relative, lane), degree, own, upstream);
             (0..3).for_each(|axis| torque[axis][lane] = of_lane[axis]);
         }
         torque
@@ -332,13 +308,13 @@ impl AdjointChunk<'_, '_, '_> {
 
 impl Visitor for AdjointChunk<'_, '_, '_> {
     #[inline(always)]
-    fn block(&mut self, position: usize, input: &BlockInput<'_>, turn: &Turn, scales: &[Lanes; 3]) {
+    fn block(&mut self, position: usize, input: &BlockInput<'_>, rotated: &Rotated, scales: &[Lanes; 3]) {
         let (block, choice) = (input.block, self.frame.strategy.covariance);
         let of_factors = self.of_factors(block);
         let of_covariance =
-            covariance::adjoint(choice, &turn.posed, input.blend, &block.rotations, scales, &of_factors);
+            covariance::adjoint(choice, &rotated.posed, input.blend, &block.rotations, scales, &of_factors);
         let mut log_scales = of_covariance.log_scales;
-        let mut rotations = self.of_rotations(input, turn, &of_covariance.rotation);
+        let mut rotations = self.of_rotations(input, rotated, &of_covariance.rotation);
         let mut units = &block.rotations;
         if choice == CovarianceChoice::Surfel {
             self.through_discs(position, input, &mut rotations, &mut log_scales);
@@ -346,11 +322,11 @@ impl Visitor for AdjointChunk<'_, '_, '_> {
             units = &own.blocks[position].rotations;
         }
         let stored = self.of_stored(input, units, &rotations);
-        let means = self.of_means(input, turn);
+        let means = self.of_means(input, rotated);
         self.add(block, &means, &stored, &log_scales);
-        if !self.turns.is_empty() {
+        if !self.relative.is_empty() {
             for lane in 0..block.count {
-                self.turns[usize::from(block.index[lane])] = take(&turn.relative, lane);
+                self.relative[usize::from(block.index[lane])] = take(&rotated.relative, lane);
             }
         }
     }

@@ -21,10 +21,10 @@ const FRAME_TOLERANCE: f32 = 1e-4;
 ///
 /// A view direction that is read in a frame F becomes SH rotated by Fᵀ (Eq. 9); exact where F is a rotation. A covariance
 /// that is not rotated but deformed becomes the rotation and scales of its principal axes: exact.
-pub fn bake(posed: &Posed, canonical: &Gaussians) -> Baked {
+pub fn bake(posed: &Posed<'_>, canonical: &Gaussians) -> Baked {
     let mut loss = None;
     let mut gaussians = Gaussians {
-        means: posed.means.clone(),
+        means: posed.means.to_vec(),
         rotations: Vec::with_capacity(posed.len()),
         log_scales: Vec::with_capacity(posed.len()),
         opacity_logits: canonical.opacity_logits.clone(),
@@ -32,7 +32,7 @@ pub fn bake(posed: &Posed, canonical: &Gaussians) -> Baked {
         sh: posed.sh.to_vec(),
     };
     for (i, &factor) in posed.factors.iter().enumerate() {
-        let (rotation, log_scale) = match &posed.rotations {
+        let (rotation, log_scale) = match posed.rotations {
             Some(rotations) => (rotations[i], log_norms(factor, canonical.log_scales[i])),
             None => principal_axes(factor),
         };
@@ -42,7 +42,7 @@ pub fn bake(posed: &Posed, canonical: &Gaussians) -> Baked {
     if posed.colour_clamp != ColourClamp::NonNegative {
         loss = Some("colours above 1 are not clamped in a static file");
     }
-    if let Some(frames) = &posed.view_frames {
+    if let Some(frames) = posed.view_frames {
         let count = (posed.sh_degree + 1).pow(2);
         for (coefficients, &frame) in gaussians.sh.chunks_exact_mut(count).zip(frames) {
             if !is_rotation(frame) {

@@ -1,7 +1,7 @@
 //! Linear blend skinning of a block (Eq. 6): the blended matrix B and what it does to the means.
 
 use super::joints::Joints;
-use super::layout::{LANES, Lanes};
+use super::lanes::{LANES, Lanes};
 use skinsplat_core::math::Matrix3;
 
 /// The blended affine map of each lane.

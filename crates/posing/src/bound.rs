@@ -1,10 +1,11 @@
 //! An avatar bound to a body: everything that does not depend on the pose, computed once.
 
+use super::error::expect_count;
+use super::groups::{self, Group};
 use super::layout::{self, CHUNK, Chunk};
 use super::nearest::NearestFace;
-use super::needs::Group;
-use super::seat::{self, Seat, Surface};
-use super::{CovarianceChoice, Strategy, StrategyError, needs, surfel};
+use super::surface::{self, Embedding, Surface};
+use super::{CovarianceChoice, PosingError, Strategy, surfel};
 use glam::Vec3;
 use rayon::prelude::*;
 use skinsplat_core::math::sh;
@@ -14,7 +15,7 @@ use std::sync::OnceLock;
 /// A canonical avatar and how it hangs on a body.
 ///
 /// * Gaussians with weights of their own also know the point of the rest mesh nearest to their mean (the lowest face
-///   index where several are equally near): face strategies turn them with that face.
+///   index where several are equally near): face strategies rotate them with that face.
 /// * Face-bound Gaussians also have skinning weights, the barycentric mix of the rows of the corners (coordinates below
 ///   zero count as zero). Their canonical mean is not read: they sit where the binding says.
 /// * Static Gaussians stay as they are under every strategy.
@@ -87,8 +88,8 @@ impl BoundAvatar {
     /// Binds an avatar to a body in its rest pose.
     ///
     /// # Errors
-    /// [`StrategyError::Scene`] for whatever [`Avatar::validate`] or [`RestBody::validate`] finds wrong.
-    pub fn new(avatar: &Avatar, body: &RestBody) -> Result<Self, StrategyError> {
+    /// [`PosingError::Scene`] for whatever [`Avatar::validate`] or [`RestBody::validate`] finds wrong.
+    pub fn new(avatar: &Avatar, body: &RestBody) -> Result<Self, PosingError> {
         body.validate()?;
         let faces = match &avatar.binding {
             Binding::Vertex(_) => NearestFace::new(body),
@@ -108,10 +109,10 @@ impl BoundAvatar {
         avatar: &Avatar,
         body: &RestBody,
         faces: Option<&NearestFace<'_>>,
-    ) -> Result<(), StrategyError> {
-        let before = self.surface.as_ref().map(|surface| &surface.seats[..]);
-        *self =
-            Self::bind(avatar, body, faces, before.filter(|seats| seats.len() == avatar.gaussians.len()))?;
+    ) -> Result<(), PosingError> {
+        let before = self.surface.as_ref().map(|surface| &surface.embeddings[..]);
+        let same = |embeddings: &&[Embedding]| embeddings.len() == avatar.gaussians.len();
+        *self = Self::bind(avatar, body, faces, before.filter(same))?;
         Ok(())
     }
 
@@ -119,20 +120,20 @@ impl BoundAvatar {
         avatar: &Avatar,
         body: &RestBody,
         faces: Option<&NearestFace<'_>>,
-        before: Option<&[Seat]>,
-    ) -> Result<Self, StrategyError> {
+        before: Option<&[Embedding]>,
+    ) -> Result<Self, PosingError> {
         avatar.validate(Some(body))?;
         let gaussians = &avatar.gaussians;
-        let (seats, mixed, moves) = match &avatar.binding {
+        let (embeddings, mixed, moves) = match &avatar.binding {
             Binding::Static => (None, None, Moves::Not),
             Binding::Vertex(_) => {
-                let seats = faces.map(|faces| seat::nearest(&gaussians.means, body, faces, before));
-                (seats, None, Moves::ByWeights)
+                let embeddings = faces.map(|faces| surface::nearest(&gaussians.means, body, faces, before));
+                (embeddings, None, Moves::ByWeights)
             }
             Binding::Face(binding) => {
-                let seats = seat::given(binding, body);
-                let mixed = mixed_weights(&seats, body)?;
-                (Some(seats), Some(mixed), Moves::WithFaces)
+                let embeddings = surface::given(binding, body);
+                let mixed = mixed_weights(&embeddings, body)?;
+                (Some(embeddings), Some(mixed), Moves::WithFaces)
             }
         };
         let weights = match &avatar.binding {
@@ -145,7 +146,7 @@ impl BoundAvatar {
             discs: OnceLock::new(),
             groups: OnceLock::new(),
             means: vec![Vec3::ZERO; n],
-            surface: seats.map(|seats| Surface::new(seats, body)),
+            surface: embeddings.map(|embeddings| Surface::new(embeddings, body)),
             moves,
             opacities: vec![0.0; n],
             sh_degree: 0,
@@ -166,9 +167,9 @@ impl BoundAvatar {
     /// the same bits as a freshly bound avatar. Values are not checked: an optimiser that makes NaNs must look for them.
     ///
     /// # Errors
-    /// [`StrategyError::Scene`] if the kind of binding, a count or the face of a Gaussian is not that of the avatar that
+    /// [`PosingError::Scene`] if the kind of binding, a count or the face of a Gaussian is not that of the avatar that
     /// was bound, which must then be bound anew. Nothing has changed then.
-    pub fn update(&mut self, avatar: &Avatar) -> Result<(), StrategyError> {
+    pub fn update(&mut self, avatar: &Avatar) -> Result<(), PosingError> {
         let moves = Moves::of(&avatar.binding);
         if moves != self.moves {
             let (found, expected) = (moves.to_string(), format!("{} as at binding", self.moves));
@@ -176,19 +177,19 @@ impl BoundAvatar {
         }
         self.check_counts(&avatar.gaussians)?;
         if let (Binding::Face(binding), Some(surface)) = (&avatar.binding, &mut self.surface) {
-            surface.reseat(binding)?;
+            surface.update(binding)?;
         }
         self.refresh(&avatar.gaussians);
         Ok(())
     }
 
     /// The body has the counts of the one that the avatar was bound to.
-    pub(crate) fn check_body(&self, body: &PosedBody<'_>) -> Result<(), StrategyError> {
+    pub(crate) fn check_body(&self, body: &PosedBody<'_>) -> Result<(), PosingError> {
         let shape = BodyShape::of(body.rest);
         if shape == self.shape {
             return Ok(());
         }
-        Err(StrategyError::OtherBody { found: shape.to_string(), expected: self.shape.to_string() })
+        Err(PosingError::OtherBody { found: shape.to_string(), expected: self.shape.to_string() })
     }
 
     /// All arrays have an entry for each of the bound Gaussians.
@@ -251,7 +252,7 @@ impl BoundAvatar {
 
     /// The Gaussians by their joints. Gathered when first asked for; weights do not change after binding.
     pub(crate) fn groups(&self) -> &[Group] {
-        self.groups.get_or_init(|| needs::groups(&self.chunks))
+        self.groups.get_or_init(|| groups::groups(&self.chunks))
     }
 
     /// For each joint whether a strategy reads its rotation: for [`PosedBody::with_rotations`]. Strategies that read the
@@ -298,22 +299,14 @@ impl BoundAvatar {
 
     /// The face and the barycentric coordinates of Gaussian `i`; `None` for static avatars and bodies without faces.
     pub fn face(&self, i: usize) -> Option<(u32, [f32; 3])> {
-        let seat = self.surface.as_ref()?.seats.get(i)?;
-        Some((seat.face, seat.barycentric))
+        let embedding = self.surface.as_ref()?.embeddings.get(i)?;
+        Some((embedding.face, embedding.barycentric))
     }
 }
 
-/// That an array has as many values as it must.
-pub(crate) fn expect_count(field: &str, found: usize, expected: usize) -> Result<(), SceneError> {
-    let problem = || SceneError::new(field, format!("{found} values"), format!("{expected}"));
-    if found == expected { Ok(()) } else { Err(problem()) }
-}
-
-fn mixed_weights(seats: &[Seat], body: &RestBody) -> Result<SkinWeights, StrategyError> {
-    let row = |seat: &Seat| {
-        let weights = seat.weights();
-        body.weights.mixed(&[0, 1, 2].map(|k: usize| (seat.corners[k] as usize, f64::from(weights[k]))))
-    };
-    let rows: Vec<_> = seats.par_iter().map(row).collect();
+/// The skinning weights of the body in the points in which Gaussians are embedded.
+fn mixed_weights(embeddings: &[Embedding], body: &RestBody) -> Result<SkinWeights, PosingError> {
+    let row = |own: &Embedding| body.weights_at(own.face, own.weights().map(f64::from));
+    let rows: Vec<_> = embeddings.par_iter().map(row).collect();
     Ok(SkinWeights::from_rows(rows, body.skeleton.num_joints())?)
 }

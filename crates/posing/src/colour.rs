@@ -1,8 +1,8 @@
 //! The colour axis: rotated SH, or frames to read the view direction in.
 
 use super::ColourChoice;
-use super::layout::Lanes;
-use super::rotate::{BlockInput, take};
+use super::lanes::{Lanes, take};
+use super::rotate::BlockInput;
 use glam::Mat3;
 use skinsplat_core::math::{Matrix3, Quaternion, matrix3, rotation, sh};
 
@@ -50,22 +50,22 @@ fn inverse_direction(m: Matrix3<f32>) -> Option<Matrix3<f32>> {
 
 /// The SH of one Gaussian turned by R (Eq. 9).
 #[inline]
-pub(super) fn rotate_sh(turn: Quaternion<f32>, degree: usize, input: &[[f32; 3]], output: &mut [[f32; 3]]) {
+pub(super) fn rotate_sh(quat: Quaternion<f32>, degree: usize, input: &[[f32; 3]], output: &mut [[f32; 3]]) {
     output.copy_from_slice(input);
-    sh::Rotation::from_unit_quaternion(turn, degree).apply(output);
+    sh::Rotation::from_unit_quaternion(quat, degree).apply(output);
 }
 
 /// Adds to the derivative with respect to the SH of one Gaussian: Dᵀ is the D of the inverse.
 #[inline]
 pub(super) fn rotate_sh_adjoint(
-    turn: Quaternion<f32>,
+    quat: Quaternion<f32>,
     degree: usize,
     upstream: &[[f32; 3]],
     gradient: &mut [[f32; 3]],
 ) {
     let mut back = [[0.0; 3]; sh::count(sh::MAX_DEGREE)];
     let back = &mut back[..upstream.len()];
-    rotate_sh(rotation::conjugate(turn), degree, upstream, back);
+    rotate_sh(rotation::conjugate(quat), degree, upstream, back);
     add_sh(back, gradient);
 }
 
@@ -79,13 +79,13 @@ pub(super) fn add_sh(upstream: &[[f32; 3]], gradient: &mut [[f32; 3]]) {
 
 /// The derivative with respect to a further rotation of SH that R has turned.
 pub(super) fn sh_torque(
-    turn: Quaternion<f32>,
+    quat: Quaternion<f32>,
     degree: usize,
     input: &[[f32; 3]],
     upstream: &[[f32; 3]],
 ) -> [f32; 3] {
     let mut turned = [[0.0; 3]; sh::count(sh::MAX_DEGREE)];
     let turned = &mut turned[..input.len()];
-    rotate_sh(turn, degree, input, turned);
+    rotate_sh(quat, degree, input, turned);
     sh::torque(degree, turned, upstream)
 }

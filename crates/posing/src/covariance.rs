@@ -2,8 +2,7 @@
 
 use super::CovarianceChoice;
 use super::blend::Blend;
-use super::layout::{LANES, Lanes};
-use super::rotate::{self, take};
+use super::lanes::{self, LANES, Lanes, take};
 use skinsplat_core::math::{Matrix3, Quaternion, matrix3, rotation};
 
 /// M per lane, row-major, from the posed quaternions or the blend.
@@ -88,7 +87,7 @@ impl CovarianceGradient {
                 + own[1][column] * of_rotation[1][column]
                 + own[2][column] * of_rotation[2][column];
         }
-        rotate::put(&mut self.rotation, lane, rotation::adjoint::quaternion_to_matrix_raw(q, of_rotation));
+        lanes::put(&mut self.rotation, lane, rotation::adjoint::quaternion_to_matrix_raw(q, of_rotation));
     }
 }
 

@@ -5,7 +5,7 @@ use std::fmt;
 
 /// Why an avatar cannot be bound or posed, or a strategy not be understood.
 #[derive(Clone, Debug, PartialEq)]
-pub enum StrategyError {
+pub enum PosingError {
     /// The avatar or the body breaks an invariant.
     Scene(SceneError),
     /// A strategy reads faces, and the body has none.
@@ -38,7 +38,7 @@ pub enum StrategyError {
     },
 }
 
-impl fmt::Display for StrategyError {
+impl fmt::Display for PosingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Scene(error) => error.fmt(f),
@@ -56,10 +56,16 @@ impl fmt::Display for StrategyError {
     }
 }
 
-impl std::error::Error for StrategyError {}
+impl std::error::Error for PosingError {}
 
-impl From<SceneError> for StrategyError {
+impl From<SceneError> for PosingError {
     fn from(error: SceneError) -> Self {
         Self::Scene(error)
     }
+}
+
+/// That an array has as many values as it must.
+pub(crate) fn expect_count(field: &str, found: usize, expected: usize) -> Result<(), SceneError> {
+    let problem = || SceneError::new(field, format!("{found} values"), format!("{expected}"));
+    if found == expected { Ok(()) } else { Err(problem()) }
 }

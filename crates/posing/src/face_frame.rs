@@ -4,9 +4,21 @@
 //! the product of its edges, or an edge of zero length) has no frame; callers then fall back on the quaternion average
 //! of the skinning weights. An inverted face has a proper frame like any other.
 
-use super::FaceFrame;
 use glam::Vec3;
 use skinsplat_core::math::{matrix3, rotation};
+
+/// Orthonormal frames on a triangle, from one edge and the normal. R is the posed frame times the transposed rest frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaceFrame {
+    /// Tangent v0→v1, columns \[d×n, −n, d\].
+    SplattingAvatar,
+    /// Tangent v1→v0, columns \[n, r1, r2\] turned in the plane. The turn is constant, so R is that of SplattingAvatar.
+    IHuman,
+    /// Tangent v1→v2, columns \[e1, n, e1×n\].
+    Haha,
+    /// HAHA in full: means and scales also follow the size k of the triangle, measured from its centroid.
+    HahaScaled,
+}
 
 /// A rotation matrix, row-major; its columns are the axes of the frame.
 pub type Frame = [[f32; 3]; 3];
@@ -54,7 +66,7 @@ pub fn ihuman_turned(triangle: [Vec3; 3], [c, s]: [f32; 2]) -> Option<Frame> {
 }
 
 /// The rotation that takes the rest frame of a face to its posed one, F_posed F_restᵀ, as a unit quaternion, w ≥ 0.
-pub(crate) fn turn(posed: &Frame, rest: &Frame) -> [f32; 4] {
+pub(crate) fn rotation_between(posed: &Frame, rest: &Frame) -> [f32; 4] {
     rotation::matrix_to_quaternion(matrix3::multiply(*posed, matrix3::transpose(*rest)))
 }
 

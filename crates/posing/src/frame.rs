@@ -1,18 +1,22 @@
-//! An avatar in one pose, walked block by block: what [`pose`](super::pose()) and its adjoint share.
+//! An avatar in one pose, walked block by block: what posing and its adjoint share.
 
 use super::blend::Blend;
 use super::bound::Moves;
+use super::error::expect_count;
 use super::face_frame;
+use super::frustum::Frustum;
 use super::joints::Joints;
-use super::layout::{Chunk, LANES, Lanes};
-use super::rotate::{BlockInput, Source, Turn, turn};
-use super::sight::Sight;
-use super::{
-    BoundAvatar, ColourChoice, CovarianceChoice, FaceFrame, JointLift, LbsProjection, RotationChoice,
-    Strategy, StrategyError,
-};
+use super::lanes::{LANES, Lanes};
+use super::layout::Chunk;
+use super::options::PoseOptions;
+use super::rotate::{BlockInput, Rotated, Source, rotate};
+use super::{BoundAvatar, ColourChoice, CovarianceChoice, PosingError, Strategy};
 use glam::{Quat, Vec3};
-use skinsplat_core::scene::{Camera, PosedBody};
+use skinsplat_core::math::{Quaternion, dot4};
+use skinsplat_core::scene::{Camera, PosedBody, SceneError};
+
+/// How far the squared length of a given quaternion may be from 1.
+const UNIT_TOLERANCE: f32 = 1e-3;
 
 /// What all chunks of a frame share.
 pub(super) struct Frame<'a> {
@@ -21,55 +25,61 @@ pub(super) struct Frame<'a> {
     pub(super) strategy: &'a Strategy,
     joints: Joints,
     pub(super) source: Source<'a>,
-    /// The only camera that will look, if what it does not see may be left out.
-    sight: Option<Sight>,
+    /// That of the only camera that will look, if what it does not see may be left out.
+    frustum: Option<Frustum>,
     arch: pulp::Arch,
 }
 
 /// What a walk does with each block.
 pub(super) trait Visitor {
-    /// `turn` and `scales` (standard deviations) are those of the block at that position in its chunk. To be inlined, so
+    /// `rotated` and `scales` (standard deviations) are those of the block at that position in its chunk. To be inlined, so
     /// that it is compiled for each instruction set.
-    fn block(&mut self, position: usize, input: &BlockInput<'_>, turn: &Turn, scales: &[Lanes; 3]);
+    fn block(&mut self, position: usize, input: &BlockInput<'_>, rotated: &Rotated, scales: &[Lanes; 3]);
 
-    /// In place of [`Visitor::block`] for one that the camera of [`Frame::seen_by`] does not see. Nothing is to be done by
+    /// In place of [`Visitor::block`] for one that the camera of the options does not see. Nothing is to be done by
     /// visitors of frames without a camera.
-    fn unseen(&mut self, _: &BlockInput<'_>, _: &[Lanes; 3]) {}
+    fn culled(&mut self, _: &BlockInput<'_>, _: &[Lanes; 3]) {}
 }
 
 impl<'a> Frame<'a> {
-    /// Everything that is computed once per pose. `lift`: of the body, for [`RotationChoice::LiftedSum`]; `None` is that
-    /// from rest.
+    /// Everything that is computed once per pose.
     pub(super) fn new(
         arch: pulp::Arch,
         bound: &'a BoundAvatar,
         body: &'a PosedBody<'a>,
         strategy: &'a Strategy,
-        lift: Option<&'a JointLift>,
-    ) -> Result<Self, StrategyError> {
+        options: &PoseOptions<'a>,
+    ) -> Result<Self, PosingError> {
         bound.check_body(body)?;
-        let needs_faces = strategy.rotation.needs_faces() || strategy.covariance == CovarianceChoice::Surfel;
+        let reads_faces = options.rotations.is_none() && strategy.rotation.needs_faces();
+        let needs_faces = reads_faces || strategy.covariance == CovarianceChoice::Surfel;
         if needs_faces && bound.surface.is_none() && bound.moves != Moves::Not {
-            return Err(StrategyError::NoFaces { strategy: strategy.to_string() });
+            return Err(PosingError::NoFaces { strategy: strategy.to_string() });
+        }
+        if let Some(lift) = options.lift {
+            expect_count("joint quaternions", lift.quaternions().len(), body.joints.len())?;
         }
         let joints = Joints::new(body);
-        let source = if reads_rotation(strategy) {
-            Source::new(strategy.rotation, &joints, body, bound.surface.as_ref(), lift)
-        } else {
-            Source::Identity
+        let source = match options.rotations {
+            Some(rotations) => {
+                check_rotations(rotations, bound.len())?;
+                Source::given(rotations)
+            }
+            None if reads_rotation(strategy) => {
+                Source::new(strategy.rotation, &joints, body, bound.surface.as_ref(), options.lift)
+            }
+            None => Source::Identity,
         };
-        Ok(Self { bound, body, strategy, joints, source, sight: None, arch })
+        let frame = Self { bound, body, strategy, joints, source, frustum: None, arch };
+        Ok(Self { frustum: options.seen_by.and_then(|camera| frame.frustum_of(camera)), ..frame })
     }
 
-    /// Leaves out what a camera does not see, where that is known before Gaussians are turned: they move by their weights
-    /// and keep their size.
-    pub(super) fn seen_by(self, camera: &Camera) -> Self {
-        let converted = self.strategy.rotation == RotationChoice::Lbs(LbsProjection::MatrixToQuaternionRaw);
-        let other_means =
-            self.strategy.rotation == RotationChoice::DualQuaternion || self.scales_with_faces();
-        let keeps_size = self.strategy.covariance == CovarianceChoice::Rotate && !converted;
-        let known = self.bound.moves == Moves::ByWeights && keeps_size && !other_means;
-        Self { sight: known.then(|| Sight::new(camera)), ..self }
+    /// What a camera sees, where that is known before Gaussians are rotated: they move by their weights and keep their
+    /// size.
+    fn frustum_of(&self, camera: &Camera) -> Option<Frustum> {
+        let follows_weights = self.bound.moves == Moves::ByWeights && !self.source.moves_means();
+        let keeps_size = self.strategy.covariance == CovarianceChoice::Rotate && !self.source.is_raw();
+        (follows_weights && keeps_size).then(|| Frustum::new(camera))
     }
 
     /// Visits the blocks of a chunk, whose first Gaussian has index `start`, with the instructions of this processor.
@@ -77,31 +87,19 @@ impl<'a> Frame<'a> {
         self.arch.dispatch(Walk { frame: self, chunk, start, visitor });
     }
 
-    /// True if the drawn quaternion is read from B R_c, so that R depends on R_c.
-    pub(super) fn converts(&self) -> bool {
-        matches!(self.source, Source::Lbs(projection) if projection.converts())
-    }
-
     /// How the mean of a Gaussian moves under HAHA's scaled frames; `None` under other strategies, for static Gaussians
     /// and on faces without area in either pose.
     pub(super) fn face_motion(&self, gaussian: usize) -> Option<FaceMotion> {
-        if !self.scales_with_faces() {
-            return None;
-        }
-        let (Some(surface), Source::Faces(turns)) = (&self.bound.surface, &self.source) else { return None };
-        let [w, x, y, z] = turns.of_gaussian(gaussian)?;
-        let seat = &surface.seats[gaussian];
-        let corners = seat.corners.map(|v| self.body.mesh().vertices[v as usize]);
+        let (surface, faces) = (self.bound.surface.as_ref()?, self.source.scaled_faces()?);
+        let [w, x, y, z] = faces.of_gaussian(gaussian)?;
+        let embedding = &surface.embeddings[gaussian];
+        let corners = embedding.corners.map(|v| self.body.mesh().vertices[v as usize]);
         Some(FaceMotion {
-            from: surface.faces.centroids[seat.face as usize],
+            from: surface.faces.centroids[embedding.face as usize],
             to: face_frame::centroid(&corners),
-            turn: Quat::from_xyzw(x, y, z, w),
-            growth: face_frame::haha_size(&corners) / surface.faces.sizes[seat.face as usize],
+            rotation: Quat::from_xyzw(x, y, z, w),
+            growth: face_frame::haha_size(&corners) / surface.faces.sizes[embedding.face as usize],
         })
-    }
-
-    pub(super) fn scales_with_faces(&self) -> bool {
-        self.strategy.rotation == RotationChoice::FaceFrame(FaceFrame::HahaScaled)
     }
 
     #[inline(never)]
@@ -119,19 +117,19 @@ impl<'a> Frame<'a> {
 pub(super) struct FaceMotion {
     from: Vec3,
     to: Vec3,
-    turn: Quat,
+    rotation: Quat,
     /// HAHA's k over its value at rest.
     growth: f32,
 }
 
 impl FaceMotion {
     pub(super) fn apply(&self, point: Vec3) -> Vec3 {
-        self.to + self.turn * (point - self.from) * self.growth
+        self.to + self.rotation * (point - self.from) * self.growth
     }
 
     /// The derivative with respect to the point.
     pub(super) fn adjoint(&self, gradient: Vec3) -> Vec3 {
-        self.turn.conjugate() * gradient * self.growth
+        self.rotation.conjugate() * gradient * self.growth
     }
 }
 
@@ -152,14 +150,28 @@ impl<V: Visitor> pulp::WithSimd for Walk<'_, '_, V> {
             let (indices, weights) = chunk.influences(block);
             let blend = Blend::new(&frame.joints, indices, weights);
             let input = BlockInput { joints: &frame.joints, chunk, block, start, blend: &blend };
-            if let Some(means) = frame.sight.as_ref().and_then(|sight| sight.hides(block, &blend)) {
-                visitor.unseen(&input, &means);
+            if let Some(means) = frame.frustum.as_ref().and_then(|frustum| frustum.culls(block, &blend)) {
+                visitor.culled(&input, &means);
                 continue;
             }
-            let turn = turn(frame.arch, &frame.source, &input);
-            let scales = if frame.scales_with_faces() { frame.grown(&input) } else { block.scales };
-            visitor.block(position, &input, &turn, &scales);
+            let rotated = rotate(frame.arch, &frame.source, &input);
+            let scales =
+                if frame.source.scaled_faces().is_some() { frame.grown(&input) } else { block.scales };
+            visitor.block(position, &input, &rotated, &scales);
         }
+    }
+}
+
+/// That there is a unit quaternion for each of n Gaussians.
+fn check_rotations(rotations: &[Quaternion<f32>], n: usize) -> Result<(), SceneError> {
+    expect_count("rotations", rotations.len(), n)?;
+    let off = |q: &Quaternion<f32>| !((dot4(*q, *q) - 1.0).abs() <= UNIT_TOLERANCE);
+    match rotations.iter().position(off) {
+        Some(i) => {
+            let problem = format!("{:?}", rotations[i]);
+            Err(SceneError::new(format!("rotations[{i}]"), problem, "a quaternion of length 1"))
+        }
+        None => Ok(()),
     }
 }
 
@@ -173,19 +185,5 @@ fn reads_rotation(strategy: &Strategy) -> bool {
         ColourChoice::RotateSh | ColourChoice::ViewRotation => true,
         ColourChoice::None | ColourChoice::ViewBlend | ColourChoice::ViewBlendInverse => false,
     };
-    let for_means = matches!(
-        strategy.rotation,
-        RotationChoice::DualQuaternion | RotationChoice::FaceFrame(FaceFrame::HahaScaled)
-    );
-    for_covariance || for_colour || for_means
-}
-
-impl LbsProjection {
-    /// True if it projects B R_c, not B.
-    pub(super) fn converts(self) -> bool {
-        match self {
-            Self::MatrixToQuaternionRaw | Self::MatrixToQuaternion => true,
-            Self::GramSchmidtColumns | Self::GramSchmidtRows | Self::Polar => false,
-        }
-    }
+    for_covariance || for_colour || strategy.rotation.moves_means()
 }

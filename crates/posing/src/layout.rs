@@ -5,17 +5,12 @@
 //! chunks are the unit of parallel work, and their borders depend on nothing but the index. The result is therefore the
 //! same, bit for bit, for any number of threads.
 
+use super::lanes::{LANES, Lanes};
 use rayon::prelude::*;
 use skinsplat_core::scene::{Gaussians, SkinWeights};
 
-/// Gaussians per block.
-pub(crate) const LANES: usize = 8;
-
 /// Gaussians per chunk.
 pub(crate) const CHUNK: usize = 2048;
-
-/// One number per Gaussian of a block.
-pub(crate) type Lanes = [f32; LANES];
 
 /// Up to [`LANES`] Gaussians on the same joints. Lanes beyond `count` repeat the last Gaussian.
 #[derive(Clone, Debug)]

@@ -21,36 +21,40 @@ mod adjoint;
 mod bake;
 mod blend;
 mod bound;
-mod choices;
 mod colour;
 mod covariance;
 mod error;
 pub mod face_frame;
 mod frame;
+mod frustum;
+mod groups;
 mod joints;
+mod lanes;
 mod layout;
 mod lift;
 pub mod nearest;
 pub mod needs;
-mod pose;
+mod options;
+mod poser;
 mod presets;
 mod rest_faces;
 mod rotate;
-mod seat;
-mod sight;
 mod spec;
+mod strategy;
+mod surface;
 mod surfel;
 
-pub use adjoint::pose_backward;
 pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;
-pub use choices::{
-    ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
-};
-pub use error::StrategyError;
+pub use error::PosingError;
+pub use face_frame::FaceFrame;
 pub use lift::JointLift;
-pub use pose::{PoseBuffers, pose, pose_into, pose_lifted, pose_seen};
+pub use options::PoseOptions;
+pub use poser::{Poser, pose};
 pub use presets::{PRESETS, Preset};
+pub use rotate::{LbsProjection, NamedRotation, RotationChoice};
+pub use spec::{Variation, variations};
+pub use strategy::{ClampChoice, ColourChoice, CovarianceChoice, Strategy};
 
 /// Version of this code as part of content keys. Raise it by hand, with a line in CHANGELOG.md, whenever a change moves
 /// numbers by more than rounding: whoever stored results under the old version computes them anew.

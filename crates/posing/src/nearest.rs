@@ -1,5 +1,5 @@
 //! The nearest point on a triangle mesh, by a bounding-volume hierarchy: how Gaussians with weights of their own find
-//! the face that a face strategy turns them with.
+//! the face that a face strategy rotates them with.
 
 use glam::DVec3;
 use skinsplat_core::scene::RestBody;

@@ -1,7 +1,6 @@
 //! The faces of the rest mesh as face strategies need them.
 
-use super::FaceFrame;
-use super::face_frame::{self, Frame};
+use super::face_frame::{self, FaceFrame, Frame};
 use glam::Vec3;
 use skinsplat_core::scene::{PosedMesh, RestBody, body};
 
@@ -42,7 +41,7 @@ impl RestFaces {
         }
     }
 
-    /// The rest frames that a kind of frame turns away from, and the kind that they were built as. iHuman's frame is
+    /// The rest frames that a kind of frame is rotated from, and the kind that they were built as. iHuman's frame is
     /// SplattingAvatar's times a constant, which cancels between two poses.
     pub(crate) fn frames(&self, kind: FaceFrame) -> (FaceFrame, &[Option<Frame>]) {
         match kind {

@@ -1,26 +1,29 @@
 //! Strategies as text: `PRESET` or `PRESET+axis=choice+axis=choice`, for instance
 //! `quaternion-average+rotation=power-15+colour=none`.
 
-use super::{PRESETS, Preset, Strategy, StrategyError};
+use super::{
+    ClampChoice, ColourChoice, CovarianceChoice, PRESETS, PosingError, Preset, RotationChoice, Strategy,
+};
+use skinsplat_core::math::average::Solver;
 use std::fmt;
 use std::str::FromStr;
 
 const AXES: [&str; 4] = ["rotation", "covariance", "colour", "clamp"];
 
 impl FromStr for Strategy {
-    type Err = StrategyError;
+    type Err = PosingError;
 
-    fn from_str(spec: &str) -> Result<Self, StrategyError> {
+    fn from_str(spec: &str) -> Result<Self, PosingError> {
         let mut parts = spec.split('+');
         let id = parts.next().unwrap_or_default();
-        let mut strategy = Self::preset(id).ok_or_else(|| StrategyError::UnknownId {
+        let mut strategy = Self::preset(id).ok_or_else(|| PosingError::UnknownId {
             axis: "strategy",
             id: id.to_owned(),
             expected: PRESETS.iter().map(|preset| preset.id).collect::<Vec<_>>().join(", "),
         })?;
         let mut seen = Vec::new();
         for part in parts {
-            let bad = |expected: String| StrategyError::BadVariation { part: part.to_owned(), expected };
+            let bad = |expected: String| PosingError::BadVariation { part: part.to_owned(), expected };
             let (axis, id) = part.split_once('=').ok_or_else(|| bad("axis=choice".into()))?;
             if seen.contains(&axis) {
                 return Err(bad(format!("{axis} once")));
@@ -36,6 +39,30 @@ impl FromStr for Strategy {
         }
         Ok(strategy)
     }
+}
+
+/// What may follow a preset in the text of a strategy.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Variation {
+    /// `axis=choice`; a parameter of the choice is in capitals.
+    pub spec: String,
+    /// What it is, in a line.
+    pub summary: &'static str,
+}
+
+/// Every choice of every axis.
+pub fn variations() -> Vec<Variation> {
+    let of = |axis: &str, id: &dyn fmt::Display, summary| Variation { spec: format!("{axis}={id}"), summary };
+    let [rotation, covariance, colour, clamp] = AXES;
+    let solvers = Solver::FORMS.map(|(form, summary)| of(rotation, &form, summary));
+    let named = RotationChoice::NAMED.map(|named| of(rotation, &named.id, named.summary));
+    let vertices =
+        of(rotation, &"vertex-average-SOLVER", "vertex-average with another solver of the average");
+    let covariances = CovarianceChoice::ALL.map(|choice| of(covariance, &choice, choice.summary()));
+    let colours = ColourChoice::ALL.map(|choice| of(colour, &choice, choice.summary()));
+    let clamps = ClampChoice::ALL.map(|choice| of(clamp, &choice, choice.summary()));
+    let rotations = solvers.into_iter().chain(named).chain([vertices]);
+    rotations.chain(covariances).chain(colours).chain(clamps).collect()
 }
 
 /// The axes as text, in the order of [`AXES`].
@@ -70,7 +97,6 @@ impl fmt::Display for Strategy {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ClampChoice, ColourChoice, CovarianceChoice, RotationChoice};
     use super::*;
 
     #[test]
@@ -84,7 +110,7 @@ mod tests {
     #[test]
     fn every_combination_round_trips() {
         let solvers = ["closed-form", "eigen", "polar", "power-15", "power-3", "nlerp"];
-        let mut rotations: Vec<RotationChoice> = RotationChoice::NAMED.to_vec();
+        let mut rotations: Vec<RotationChoice> = RotationChoice::named().collect();
         for solver in solvers {
             rotations.push(solver.parse().unwrap());
             rotations.push(format!("vertex-average-{solver}").parse().unwrap());
@@ -119,6 +145,19 @@ mod tests {
         }
         for choice in ClampChoice::ALL {
             assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{choice}\""));
+        }
+    }
+
+    #[test]
+    fn every_variation_can_be_asked_for() {
+        let parameters = [("SOLVER", "eigen"), ("[-START]", "-ones"), ("N", "3")];
+        let all = variations();
+        assert!(RotationChoice::named().all(|r| all.iter().any(|v| v.spec == format!("rotation={r}"))));
+        for Variation { spec, summary } in all {
+            let filled =
+                parameters.iter().fold(spec.clone(), |text, (name, value)| text.replace(name, value));
+            assert!(format!("lbs+{filled}").parse::<Strategy>().is_ok(), "{spec}");
+            assert!(!summary.is_empty(), "{spec}");
         }
     }
 

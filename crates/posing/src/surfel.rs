@@ -1,8 +1,8 @@
 //! iHuman's parametrisation: every Gaussian a disc in its face.
 
-use super::layout::{CHUNK, Chunk, LANES};
-use super::rotate::{put, take};
-use super::seat::Surface;
+use super::lanes::{LANES, put, take};
+use super::layout::{CHUNK, Chunk};
+use super::surface::Surface;
 use rayon::prelude::*;
 use skinsplat_core::math::{Matrix3, Quaternion, dot4, matrix3, rotation};
 
@@ -61,7 +61,7 @@ pub(super) struct Disc {
 impl Disc {
     /// `None` on a face without area.
     pub(super) fn nearest(own: Quaternion<f32>, surface: &Surface, gaussian: usize) -> Option<Self> {
-        let frame = surface.faces.edge01[surface.seats[gaussian].face as usize]?;
+        let frame = surface.faces.edge01[surface.embeddings[gaussian].face as usize]?;
         // SplattingAvatar's columns are [d × n, −n, d]; iHuman's are [n, −d, d × n].
         let [across, minus_n, d] = matrix3::transpose(frame);
         let negated = |v: [f32; 3]| v.map(|c| -c);

@@ -9,7 +9,7 @@ use glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
 use serde_json::Value;
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::{
-    Avatar, Binding, ColourClamp, Gaussians, LocalTransform, Pose, Posed, PosedBody, RestBody, Skeleton,
+    Avatar, Binding, ColourClamp, Gaussians, LocalTransform, OwnedPosed, Pose, PosedBody, RestBody, Skeleton,
     SkinWeights,
 };
 use skinsplat_posing::{BoundAvatar, FaceFrame, Strategy, face_frame, pose};
@@ -96,19 +96,19 @@ impl Case {
         Self { pose: free_pose(motions), body, bound }
     }
 
-    fn posed(&self, strategy: &str) -> Posed<'_> {
+    fn posed(&self, strategy: &str) -> OwnedPosed {
         let body = PosedBody::new(&self.body, &self.pose).unwrap();
         pose(&self.bound, &body, &strategy.parse::<Strategy>().unwrap()).unwrap()
     }
 }
 
-fn covariance(posed: &Posed<'_>) -> DMat3 {
+fn covariance(posed: &OwnedPosed) -> DMat3 {
     let m = posed.factors[0].as_dmat3();
     m * m.transpose()
 }
 
 /// What a renderer reads: SH along the view direction (through the frame, if any), plus 0.5, clamped.
-fn colour(posed: &Posed<'_>, camera: DVec3) -> [f64; 3] {
+fn colour(posed: &OwnedPosed, camera: DVec3) -> [f64; 3] {
     let direction = (posed.means[0].as_dvec3() - camera).normalize();
     let frame = posed.view_frames.as_ref().map_or(DMat3::IDENTITY, |frames| frames[0].as_dmat3());
     let direction = (frame * direction).normalize();
@@ -119,7 +119,7 @@ fn colour(posed: &Posed<'_>, camera: DVec3) -> [f64; 3] {
 }
 
 /// Upper triangle xx, xy, xz, yy, yz, zz.
-fn assert_covariance(posed: &Posed<'_>, expected: &Value, scale: DVec3, tolerance: f64, what: &str) {
+fn assert_covariance(posed: &OwnedPosed, expected: &Value, scale: DVec3, tolerance: f64, what: &str) {
     let e = numbers(expected);
     let expected = if e.len() == 6 {
         DMat3::from_cols_array(&[e[0], e[1], e[2], e[1], e[3], e[4], e[2], e[4], e[5]])

@@ -10,8 +10,8 @@ use glam::DVec3;
 use posing_gradients::{Case, Parameter, chooses, kinds, upstream};
 use skinsplat_core::scene::{Avatar, AvatarGradient, Binding, PosedBody, PosedGradient};
 use skinsplat_posing::{
-    ClampChoice, ColourChoice, CovarianceChoice, LbsProjection, PRESETS, RotationChoice, Strategy,
-    StrategyError, pose, pose_backward,
+    ClampChoice, ColourChoice, CovarianceChoice, LbsProjection, PRESETS, PoseOptions, Poser, PosingError,
+    RotationChoice, Strategy, pose,
 };
 
 const N: usize = 80;
@@ -100,7 +100,7 @@ fn every_choice_of_every_axis() {
 fn no_preset_and_no_choice_is_missed() {
     let all = rig::strategies();
     assert!(PRESETS.iter().all(|preset| all.contains(&preset.strategy)));
-    for rotation in RotationChoice::NAMED {
+    for rotation in RotationChoice::named() {
         assert!(
             all.iter().any(|s| s.rotation == rotation && s.colour == ColourChoice::RotateSh),
             "{rotation}"
@@ -220,7 +220,9 @@ fn frames_of_a_batch_add_up() {
                 let case = Case::new(avatar.clone(), &body);
                 let upstream = upstream(&pose(&case.bound, &body, &preset.strategy).unwrap(), seed);
                 let Case { bound, .. } = &case;
-                pose_backward(bound, &body, &preset.strategy, &avatar.gaussians, &upstream, &mut sum)
+                let (strategy, options) = (&preset.strategy, PoseOptions::default());
+                Poser::new()
+                    .backward(bound, &body, strategy, &options, &avatar.gaussians, &upstream, &mut sum)
                     .unwrap();
                 let one = entries(&case.gradient(&preset.strategy, &upstream));
                 expected.iter_mut().zip(one).for_each(|(sum, own)| *sum += own);
@@ -267,10 +269,12 @@ fn arrays_that_do_not_fit_are_named() {
     let attempt = |upstream: &PosedGradient, avatar: &Avatar, mut gradient: AvatarGradient| {
         let before = gradient.clone();
         let Case { bound, .. } = &case;
-        let result = pose_backward(bound, &body, &strategy, &avatar.gaussians, upstream, &mut gradient);
+        let (gaussians, options) = (&avatar.gaussians, PoseOptions::default());
+        let result =
+            Poser::new().backward(bound, &body, &strategy, &options, gaussians, upstream, &mut gradient);
         assert_eq!(gradient, before);
         match result.unwrap_err() {
-            StrategyError::Scene(error) => error.field,
+            PosingError::Scene(error) => error.field,
             other => panic!("{other}"),
         }
     };
@@ -279,7 +283,7 @@ fn arrays_that_do_not_fit_are_named() {
     assert_eq!(attempt(&short, &case.avatar, fitting.clone()), "gradient of the factors");
     let lower = with_degree(case.avatar.clone(), 1);
     assert_eq!(attempt(&good, &lower, fitting.clone()), "f_dc/f_rest");
-    let mut not_seated = fitting.clone();
-    not_seated.offsets.clear();
-    assert_eq!(attempt(&good, &case.avatar, not_seated), "gradient of offset");
+    let mut not_embedded = fitting.clone();
+    not_embedded.offsets.clear();
+    assert_eq!(attempt(&good, &case.avatar, not_embedded), "gradient of offset");
 }

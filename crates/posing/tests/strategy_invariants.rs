@@ -8,7 +8,7 @@ use glam::{DMat3, DQuat, DVec3, Mat3};
 use proptest::prelude::*;
 use skinsplat_core::math::rotation::angle_between;
 use skinsplat_core::math::sh;
-use skinsplat_core::scene::{Avatar, Binding, Gaussians, Pose, Posed, PosedBody, RestBody, SkinWeights};
+use skinsplat_core::scene::{Avatar, Binding, Gaussians, OwnedPosed, Pose, PosedBody, RestBody, SkinWeights};
 use skinsplat_posing::{
     BoundAvatar, ColourChoice, CovarianceChoice, PRESETS, RotationChoice, Strategy, pose,
 };
@@ -17,7 +17,7 @@ fn strategy(spec: &str) -> Strategy {
     spec.parse().unwrap()
 }
 
-fn posed<'a>(bound: &'a BoundAvatar, body: &RestBody, at: &Pose, strategy: &Strategy) -> Posed<'a> {
+fn posed(bound: &BoundAvatar, body: &RestBody, at: &Pose, strategy: &Strategy) -> OwnedPosed {
     pose(bound, &PosedBody::new(body, at).unwrap(), strategy).unwrap()
 }
 
@@ -36,7 +36,7 @@ fn covariance(factor: &Mat3) -> DMat3 {
 }
 
 /// The colour of Gaussian `i` seen along `direction`.
-fn seen(posed: &Posed<'_>, i: usize, direction: DVec3) -> DVec3 {
+fn seen(posed: &OwnedPosed, i: usize, direction: DVec3) -> DVec3 {
     let frame = posed.view_frames.as_ref().map_or(DMat3::IDENTITY, |frames| frames[i].as_dmat3());
     let direction = (frame * direction).normalize().to_array();
     let count = sh::count(posed.sh_degree);
@@ -189,7 +189,7 @@ proptest! {
                 prop_assert!(a.means[i] == b.means[k] && a.factors[i] == b.factors[k], "{strategy}");
                 prop_assert!(a.sh[i * 16..(i + 1) * 16] == b.sh[k * 16..(k + 1) * 16], "{strategy}");
                 prop_assert_eq!(a.opacities[i], b.opacities[k]);
-                let frame = |p: &Posed<'_>, i: usize| p.view_frames.as_ref().map(|f| f[i]);
+                let frame = |p: &OwnedPosed, i: usize| p.view_frames.as_ref().map(|f| f[i]);
                 prop_assert_eq!(frame(&a, i), frame(&b, k));
             }
         }
@@ -225,7 +225,7 @@ proptest! {
                 let base = Strategy { rotation, ..strategy("quaternion-average") };
                 let by_view = Strategy { colour: ColourChoice::ViewRotation, ..base };
                 let (a, b) = (posed(&bound, &body, &at, &base), posed(&bound, &body, &at, &by_view));
-                prop_assert!(a.view_frames.is_none() && b.sh.as_ptr() != a.sh.as_ptr());
+                prop_assert!(a.view_frames.is_none() && b.view_frames.is_some());
                 for i in 0..a.len() {
                     let direction = noise.vector().normalize();
                     let error = seen(&a, i, direction).distance(seen(&b, i, direction));
@@ -242,7 +242,7 @@ fn the_rest_pose_changes_nothing() {
     let rest = Pose::rest(&body.skeleton);
     for avatar in [rig::on_vertices(&body, 80, 3), rig::on_faces(&body, 80, 3)] {
         let bound = BoundAvatar::new(&avatar, &body).unwrap();
-        let expected = Posed::from_static(&avatar.gaussians);
+        let expected = OwnedPosed::from_static(&avatar.gaussians);
         for strategy in rig::strategies() {
             let found = posed(&bound, &body, &rest, &strategy);
             for i in 0..80 {

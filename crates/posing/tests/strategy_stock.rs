@@ -7,17 +7,17 @@ mod rig;
 use glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
 use skinsplat_core::math::average::{Solver, average_rotation};
 use skinsplat_core::scene::{
-    Avatar, Binding, ColourClamp, FaceBinding, Pose, Posed, PosedBody, RestBody, SkinWeights,
+    Avatar, Binding, ColourClamp, FaceBinding, OwnedPosed, Pose, PosedBody, RestBody, SkinWeights,
 };
 use skinsplat_posing::{
-    BoundAvatar, ColourChoice, FaceFrame, PRESETS, Strategy, StrategyError, face_frame, pose,
+    BoundAvatar, ColourChoice, FaceFrame, PRESETS, PosingError, Strategy, face_frame, pose,
 };
 
 fn strategy(spec: &str) -> Strategy {
     spec.parse().unwrap()
 }
 
-fn posed<'a>(bound: &'a BoundAvatar, body: &PosedBody<'_>, spec: &str) -> Posed<'a> {
+fn posed(bound: &BoundAvatar, body: &PosedBody<'_>, spec: &str) -> OwnedPosed {
     pose(bound, body, &strategy(spec)).unwrap()
 }
 
@@ -326,7 +326,7 @@ fn static_avatars_stay() {
     let avatar = Avatar { binding: Binding::Static, ..rig::on_vertices(&body, 30, 81) };
     let bound = BoundAvatar::new(&avatar, &body).unwrap();
     let posed_body = PosedBody::new(&body, &rig::bent(&body, 82, 1.0)).unwrap();
-    let expected = Posed::from_static(&avatar.gaussians);
+    let expected = OwnedPosed::from_static(&avatar.gaussians);
     for preset in PRESETS.iter().filter(|preset| preset.id != "animatable-original") {
         let found = pose(&bound, &posed_body, &preset.strategy).unwrap();
         assert_eq!(found.means, expected.means);
@@ -349,7 +349,7 @@ fn errors_say_what_lacks() {
         ["face-tbn", "ihuman-original", "quaternion-average+rotation=vertex-average", "lbs+covariance=surfel"]
     {
         let error = pose(&bound, &posed_body, &strategy(spec)).unwrap_err();
-        assert_eq!(error, StrategyError::NoFaces { strategy: spec.into() });
+        assert_eq!(error, PosingError::NoFaces { strategy: spec.into() });
         assert!(error.to_string().contains("no faces"), "{error}");
     }
     assert!(pose(&bound, &posed_body, &strategy("lbs")).is_ok());

@@ -4,8 +4,8 @@
 #[path = "../../../tests/support/rig.rs"]
 mod rig;
 
-use skinsplat_core::scene::{Avatar, Binding, Gaussians, PosedBody};
-use skinsplat_posing::{BoundAvatar, PRESETS, PoseBuffers, StrategyError, pose, pose_into};
+use skinsplat_core::scene::{Avatar, Binding, Gaussians, OwnedPosed, PosedBody, RestBody};
+use skinsplat_posing::{BoundAvatar, PRESETS, PoseOptions, Poser, PosingError, pose};
 
 const N: usize = 3_000;
 
@@ -87,7 +87,7 @@ fn what_cannot_be_taken_over_is_named() {
         let mut next = changed(&avatar, 4, 1);
         change(&mut next);
         match bound.update(&next).unwrap_err() {
-            StrategyError::Scene(error) => assert_eq!(error.field, field, "{error}"),
+            PosingError::Scene(error) => assert_eq!(error.field, field, "{error}"),
             other => panic!("{other}"),
         }
         assert!(pose_of(&bound, &body) == before, "{field}: nothing changes");
@@ -105,35 +105,26 @@ fn what_cannot_be_taken_over_is_named() {
     attempt(&|next| binding(next).faces[7] ^= 1, "face[7]");
 }
 
-fn pose_of(
-    bound: &BoundAvatar,
-    body: &skinsplat_core::scene::RestBody,
-) -> skinsplat_core::scene::Posed<'static> {
+fn pose_of(bound: &BoundAvatar, body: &RestBody) -> OwnedPosed {
     let at = rig::bent(body, 3, 1.0);
-    let posed = pose(bound, &PosedBody::new(body, &at).unwrap(), &PRESETS[3].strategy).unwrap();
-    skinsplat_core::scene::Posed {
-        opacities: posed.opacities.into_owned().into(),
-        sh: posed.sh.into_owned().into(),
-        ..posed
-    }
+    pose(bound, &PosedBody::new(body, &at).unwrap(), &PRESETS[3].strategy).unwrap()
 }
 
 #[test]
 fn memory_of_before_leaves_no_trace() {
     let body = rig::body();
     let posed_body = PosedBody::new(&body, &rig::bent(&body, 3, 1.0)).unwrap();
-    let mut buffers = PoseBuffers::default();
+    let (mut poser, options) = (Poser::new(), PoseOptions::default());
     for n in [N, 100, 2 * N] {
         for avatar in [rig::on_vertices(&body, n, 1), rig::on_faces(&body, n, 1)] {
             let bound = BoundAvatar::new(&avatar, &body).unwrap();
             for preset in PRESETS {
-                let posed = pose_into(&bound, &posed_body, &preset.strategy, &mut buffers).unwrap();
-                assert!(posed == pose(&bound, &posed_body, &preset.strategy).unwrap(), "{}", preset.id);
+                let posed = poser.pose(&bound, &posed_body, &preset.strategy, &options).unwrap();
+                let fresh = pose(&bound, &posed_body, &preset.strategy).unwrap();
+                assert!(posed == fresh.as_posed(), "{}", preset.id);
                 let memory = posed.means.as_ptr();
-                buffers.reclaim(posed);
-                let again = pose_into(&bound, &posed_body, &preset.strategy, &mut buffers).unwrap();
+                let again = poser.pose(&bound, &posed_body, &preset.strategy, &options).unwrap();
                 assert_eq!(again.means.as_ptr(), memory, "{}", preset.id);
-                buffers.reclaim(again);
             }
         }
     }

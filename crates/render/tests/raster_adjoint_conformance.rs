@@ -8,7 +8,7 @@ mod splat_scene;
 mod support;
 
 use glam::{Mat3, Quat, Vec3, Vec4};
-use skinsplat_core::scene::{Gaussians, Image, Posed, PosedGradient, RenderedGradient};
+use skinsplat_core::scene::{Gaussians, Image, OwnedPosed, PosedGradient, RenderedGradient};
 use skinsplat_data::npz::Archive;
 use skinsplat_render::splat::{Derivatives, RenderSettings, Renderer, SimdLevel};
 use support::{fixture, json};
@@ -59,7 +59,7 @@ fn relative(found: &[f32], expected: &[f32], count: usize) -> [f64; 2] {
 fn scene_s_has_the_derivatives_of_the_original_kernels() {
     let (camera, background) = splat_scene::camera(&json("raster/front_512.json"));
     let gaussians = splat_scene::gaussians(&fixture("raster/scene_S.ply"));
-    let posed = Posed::from_static(&gaussians);
+    let posed = OwnedPosed::from_static(&gaussians);
     let settings = RenderSettings { background, antialiased: false };
     // The upstream that the kernels were given, less the pixels that nothing was drawn to.
     let upstream = array("raster/S_front_512_dl_dimage.npz", "dl_dimage");
@@ -68,10 +68,18 @@ fn scene_s_has_the_derivatives_of_the_original_kernels() {
     let mut gradients = Vec::new();
     for level in [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512] {
         let Some(mut renderer) = Renderer::with_simd_level(level) else { continue };
-        let rendered = renderer.render(&posed, &camera, &settings);
+        let rendered = renderer.render(&posed.as_posed(), &camera, &settings);
         let mut gradient = PosedGradient::default();
         let original = Derivatives::OriginalKernels;
-        renderer.backward(&posed, &camera, &settings, &rendered, &upstream, original, &mut gradient);
+        renderer.backward(
+            &posed.as_posed(),
+            &camera,
+            &settings,
+            &rendered,
+            &upstream,
+            original,
+            &mut gradient,
+        );
         gradients.push(gradient);
     }
     assert!(gradients.windows(2).all(|pair| pair[0] == pair[1]), "every vector width gives the same bits");

@@ -11,13 +11,13 @@ use differences::{assert_close, assert_gradient, difference};
 use glam::{Mat3, Vec3};
 use proptest::prelude::*;
 use random_scene::{Random, camera, chosen, posed};
-use skinsplat_core::scene::{Camera, ColourClamp, Image, Mask, Posed, PosedGradient, RenderedGradient};
+use skinsplat_core::scene::{Camera, ColourClamp, Image, Mask, OwnedPosed, PosedGradient, RenderedGradient};
 use skinsplat_render::definition as reference_splatting;
 use skinsplat_render::splat::{Derivatives, RenderSettings, Renderer, SimdLevel};
 
 /// Everything that a loss needs, from a seed.
 struct Scene {
-    posed: Posed<'static>,
+    posed: OwnedPosed,
     camera: Camera,
     settings: RenderSettings,
     upstream: RenderedGradient,
@@ -41,9 +41,17 @@ impl Scene {
 
     fn gradient(&self, renderer: &mut Renderer, derivatives: Derivatives) -> PosedGradient {
         let Self { posed, camera, settings, upstream } = self;
-        let rendered = renderer.render(posed, camera, settings);
+        let rendered = renderer.render(&posed.as_posed(), camera, settings);
         let mut gradient = PosedGradient::default();
-        renderer.backward(posed, camera, settings, &rendered, upstream, derivatives, &mut gradient);
+        renderer.backward(
+            &posed.as_posed(),
+            camera,
+            settings,
+            &rendered,
+            upstream,
+            derivatives,
+            &mut gradient,
+        );
         gradient
     }
 
@@ -52,8 +60,8 @@ impl Scene {
     }
 
     /// The loss in f64 whose derivatives by pixel are `upstream`.
-    fn loss(&self, posed: &Posed, camera: &Camera, chosen: &[Vec<usize>]) -> f64 {
-        let pixels = reference_splatting::render_chosen(posed, camera, &self.settings, chosen);
+    fn loss(&self, posed: &OwnedPosed, camera: &Camera, chosen: &[Vec<usize>]) -> f64 {
+        let pixels = reference_splatting::render_chosen(&posed.as_posed(), camera, &self.settings, chosen);
         let of = |i: usize, pixel: [f64; 5]| {
             let colour = self.upstream.image.pixels()[i];
             let alpha = self.upstream.alpha.as_ref().map_or(0.0, |alpha| alpha.values()[i]);
@@ -63,7 +71,7 @@ impl Scene {
     }
 
     fn chosen(&self) -> Vec<Vec<usize>> {
-        reference_splatting::chosen(&self.posed, &self.camera, &self.settings)
+        reference_splatting::chosen(&self.posed.as_posed(), &self.camera, &self.settings)
     }
 }
 
@@ -110,7 +118,7 @@ fn screen_derivatives_are_per_half_image_size() {
 fn long_lists_have_the_derivatives_of_the_definition() {
     let mut scene = Scene::new(17, 20_000, 64, 16);
     scene.posed.factors.iter_mut().for_each(|factor| *factor *= 0.2);
-    scene.posed.opacities.to_mut().iter_mut().for_each(|opacity| *opacity *= 0.05);
+    scene.posed.opacities.iter_mut().for_each(|opacity| *opacity *= 0.05);
     let mut renderer = Renderer::new();
     let gradient = scene.gradient(&mut renderer, Derivatives::Exact);
     assert!(renderer.visible() > 2 * 4096, "{} splats", renderer.visible());
@@ -120,11 +128,9 @@ fn long_lists_have_the_derivatives_of_the_definition() {
     drawn.dedup();
     let some: Vec<usize> = drawn.into_iter().step_by(400).collect();
     assert!(some.len() > 10);
-    let loss = |p: &Posed<'static>| scene.loss(p, &scene.camera, &chosen);
-    let expected: Vec<f64> = some
-        .iter()
-        .map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities.to_mut()[i]))
-        .collect();
+    let loss = |p: &OwnedPosed| scene.loss(p, &scene.camera, &chosen);
+    let expected: Vec<f64> =
+        some.iter().map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i])).collect();
     let found: Vec<f32> = some.iter().map(|&i| gradient.opacities[i]).collect();
     assert_close("opacities", &found, &expected, 1e-5);
 }
@@ -199,21 +205,21 @@ fn nothing_carries_over_from_frame_to_frame() {
     {
         let scene = Scene::new(seed, count, width, height);
         let Scene { posed, camera, settings, upstream } = &scene;
-        let rendered = renderer.render(posed, camera, settings);
+        let rendered = renderer.render(&posed.as_posed(), camera, settings);
         let exact = Derivatives::Exact;
-        renderer.backward(posed, camera, settings, &rendered, upstream, exact, &mut gradient);
+        renderer.backward(&posed.as_posed(), camera, settings, &rendered, upstream, exact, &mut gradient);
         assert_eq!(gradient, scene.exact());
     }
 }
 
 /// One Gaussian straight ahead, one pixel.
 fn single(opacity: f32) -> Scene {
-    let posed = Posed {
+    let posed = OwnedPosed {
         means: vec![Vec3::new(0.0, 0.0, 2.0)],
         factors: vec![Mat3::IDENTITY * 0.5],
-        opacities: vec![opacity].into(),
+        opacities: vec![opacity],
         sh_degree: 0,
-        sh: vec![[1.0, 0.5, 0.0]].into(),
+        sh: vec![[1.0, 0.5, 0.0]],
         view_frames: None,
         colour_clamp: ColourClamp::NonNegative,
         rotations: None,
@@ -301,8 +307,8 @@ fn the_original_kernels_differentiate_the_antialiasing_factor_at_the_low_passed_
 #[should_panic(expected = "backward must follow")]
 fn a_frame_that_was_not_drawn_is_refused() {
     let scene = single(0.5);
-    let rendered = Renderer::new().render(&scene.posed, &scene.camera, &scene.settings);
+    let rendered = Renderer::new().render(&scene.posed.as_posed(), &scene.camera, &scene.settings);
     let (exact, mut gradient) = (Derivatives::Exact, PosedGradient::default());
     let Scene { posed, camera, settings, upstream } = &scene;
-    Renderer::new().backward(posed, camera, settings, &rendered, upstream, exact, &mut gradient);
+    Renderer::new().backward(&posed.as_posed(), camera, settings, &rendered, upstream, exact, &mut gradient);
 }

@@ -8,7 +8,7 @@ mod support;
 
 use glam::{DMat4, Quat, Vec3};
 use serde_json::Value;
-use skinsplat_core::scene::{Camera, Gaussians, Posed};
+use skinsplat_core::scene::{Camera, Gaussians, OwnedPosed};
 use skinsplat_render::splat::{RenderSettings, Renderer, SimdLevel};
 use support::{fixture, json};
 
@@ -36,12 +36,12 @@ fn scene_s_is_the_image_of_the_original_kernels() {
     let golden: Vec<f32> = npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap();
     let (camera, background) = splat_scene::camera(&json("raster/front_512.json"));
     let gaussians = splat_scene::gaussians(&fixture("raster/scene_S.ply"));
-    let posed = Posed::from_static(&gaussians);
+    let posed = OwnedPosed::from_static(&gaussians);
     let settings = RenderSettings { background, antialiased: false };
     let mut images = Vec::new();
     for level in [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512] {
         let Some(mut renderer) = Renderer::with_simd_level(level) else { continue };
-        let rendered = renderer.render(&posed, &camera, &settings);
+        let rendered = renderer.render(&posed.as_posed(), &camera, &settings);
         assert_same_image(&format!("{level:?}"), rendered.image.pixels().as_flattened(), &golden);
         images.push(rendered);
     }
@@ -71,8 +71,8 @@ fn tiny_gaussians(cases: &Value) -> (Gaussians, Vec<f32>) {
 fn tiny_render_has_the_reference_colours_and_transmittance_with_the_tile_cull() {
     let case = json("gs_math/tiny_render.json");
     let (gaussians, opacities) = tiny_gaussians(&case["gaussians"]);
-    let mut posed = Posed::from_static(&gaussians);
-    posed.opacities = opacities.into();
+    let mut posed = OwnedPosed::from_static(&gaussians);
+    posed.opacities = opacities;
     posed.factors = std::iter::zip(case["gaussians"].as_array().unwrap(), gaussians.unit_rotations())
         .map(|(case, [w, x, y, z])| {
             let scale = Vec3::from_slice(&numbers(&case["scale"]));
@@ -92,8 +92,11 @@ fn tiny_render_has_the_reference_colours_and_transmittance_with_the_tile_cull() 
         camera_from_world: DMat4::from_cols_slice(&view).transpose(),
     };
     let background = numbers(&case["background"]).try_into().unwrap();
-    let rendered =
-        Renderer::new().render(&posed, &camera, &RenderSettings { background, antialiased: false });
+    let rendered = Renderer::new().render(
+        &posed.as_posed(),
+        &camera,
+        &RenderSettings { background, antialiased: false },
+    );
     let found = rendered.image.pixels().as_flattened();
     assert_same_image("colour", found, &numbers(&case["image_hwc_tilecull"]));
     let transmittance: Vec<f32> = rendered.alpha.values().iter().map(|alpha| 1.0 - alpha).collect();

@@ -7,7 +7,7 @@ mod random_scene;
 use glam::{Mat3, Vec3};
 use proptest::prelude::*;
 use random_scene::{Random, camera, chosen, posed};
-use skinsplat_core::scene::{Camera, Posed, Rendered};
+use skinsplat_core::scene::{Camera, OwnedPosed, Rendered};
 use skinsplat_render::definition as reference_splatting;
 use skinsplat_render::splat::{RenderSettings, Renderer, SimdLevel, render};
 
@@ -17,7 +17,7 @@ fn settings(random: &mut Random) -> RenderSettings {
 }
 
 /// A scene of up to `most` Gaussians, a camera and settings, all from a seed.
-fn scene(seed: u64, most: usize, width: u32, height: u32) -> (Posed<'static>, Camera, RenderSettings) {
+fn scene(seed: u64, most: usize, width: u32, height: u32) -> (OwnedPosed, Camera, RenderSettings) {
     let mut random = Random(seed);
     let count = random.below(most + 1);
     let posed = posed(&mut random, count);
@@ -32,19 +32,19 @@ fn channels(rendered: &Rendered) -> Vec<[f32; 5]> {
     pixels.map(|((&[r, g, b], &alpha), &depth)| [r, g, b, alpha, depth]).collect()
 }
 
-fn with_threads(threads: usize, posed: &Posed, camera: &Camera, settings: &RenderSettings) -> Rendered {
+fn with_threads(threads: usize, posed: &OwnedPosed, camera: &Camera, settings: &RenderSettings) -> Rendered {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| render(posed, camera, settings))
+    pool.install(|| render(&posed.as_posed(), camera, settings))
 }
 
 /// One Gaussian in front of a camera at the origin that looks along z.
-fn single(mean: Vec3, factor: Mat3, opacity: f32) -> Posed<'static> {
-    Posed {
+fn single(mean: Vec3, factor: Mat3, opacity: f32) -> OwnedPosed {
+    OwnedPosed {
         means: vec![mean],
         factors: vec![factor],
-        opacities: vec![opacity].into(),
+        opacities: vec![opacity],
         sh_degree: 0,
-        sh: vec![[1.0, 0.5, 0.0]].into(),
+        sh: vec![[1.0, 0.5, 0.0]],
         view_frames: None,
         colour_clamp: Default::default(),
         rotations: None,
@@ -71,8 +71,8 @@ proptest! {
     #[test]
     fn images_are_those_of_the_definition(seed: u64, width in 1_u32..70, height in 1_u32..70) {
         let (posed, camera, settings) = scene(seed, 60, width, height);
-        let found = channels(&render(&posed, &camera, &settings));
-        let expected = reference_splatting::render(&posed, &camera, &settings);
+        let found = channels(&render(&posed.as_posed(), &camera, &settings));
+        let expected = reference_splatting::render(&posed.as_posed(), &camera, &settings);
         let mut errors: Vec<f64> = std::iter::zip(&found, &expected)
             .flat_map(|(a, b)| (0..5).map(|c| (f64::from(a[c]) - b[c]).abs() / [1.0, 1.0, 1.0, 1.0, 10.0][c]))
             .collect();
@@ -90,7 +90,7 @@ proptest! {
         prop_assert_eq!(&with_threads(5, &posed, &camera, &settings), &one);
         for level in [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512] {
             if let Some(mut renderer) = Renderer::with_simd_level(level) {
-                prop_assert_eq!(&renderer.render(&posed, &camera, &settings), &one);
+                prop_assert_eq!(&renderer.render(&posed.as_posed(), &camera, &settings), &one);
             }
         }
     }
@@ -102,14 +102,14 @@ proptest! {
         let mut order: Vec<usize> = (0..posed.len()).collect();
         let mut random = Random(seed ^ 1);
         (1..order.len()).for_each(|i| order.swap(i, random.below(i + 1)));
-        prop_assert_eq!(render(&chosen(&posed, &order), &camera, &settings), render(&posed, &camera, &settings));
+        prop_assert_eq!(render(&chosen(&posed, &order).as_posed(), &camera, &settings), render(&posed.as_posed(), &camera, &settings));
     }
 
     #[test]
     fn the_background_enters_by_the_transmittance_left(seed: u64) {
         let (posed, camera, settings) = scene(seed, 80, 40, 30);
-        let over = render(&posed, &camera, &settings);
-        let black = render(&posed, &camera, &RenderSettings { background: [0.0; 3], ..settings });
+        let over = render(&posed.as_posed(), &camera, &settings);
+        let black = render(&posed.as_posed(), &camera, &RenderSettings { background: [0.0; 3], ..settings });
         prop_assert_eq!((&over.alpha, &over.depth), (&black.alpha, &black.depth));
         for (a, b) in std::iter::zip(channels(&over), channels(&black)) {
             prop_assert!((0.0..=1.0).contains(&a[3]));
@@ -133,10 +133,10 @@ proptest! {
         match field {
             0 => posed.means[victim][axis] = bad,
             1 => posed.factors[victim].col_mut(axis)[random.below(3)] = bad,
-            2 => posed.opacities.to_mut()[victim] = bad,
+            2 => posed.opacities[victim] = bad,
             3 => {
                 let first = victim * (posed.sh_degree + 1).pow(2);
-                posed.sh.to_mut()[first][axis] = bad;
+                posed.sh[first][axis] = bad;
             }
             _ => match &mut posed.view_frames {
                 Some(frames) if posed.sh_degree > 0 => frames[victim].col_mut(axis)[0] = bad,
@@ -144,9 +144,9 @@ proptest! {
             },
         }
         let others: Vec<usize> = (0..posed.len()).filter(|&i| i != victim).collect();
-        let found = render(&posed, &camera, &settings);
+        let found = render(&posed.as_posed(), &camera, &settings);
         prop_assert!(channels(&found).as_flattened().iter().all(|v| v.is_finite()));
-        prop_assert_eq!(found, render(&chosen(&posed, &others), &camera, &settings));
+        prop_assert_eq!(found, render(&chosen(&posed, &others).as_posed(), &camera, &settings));
     }
 }
 
@@ -166,15 +166,15 @@ proptest! {
             match random.below(4) {
                 0 => posed.means[i][random.below(3)] = extreme(&mut random),
                 1 => posed.factors[i].col_mut(random.below(3))[random.below(3)] = extreme(&mut random),
-                2 => posed.opacities.to_mut()[i] = extreme(&mut random).clamp(0.0, 1.0),
+                2 => posed.opacities[i] = extreme(&mut random).clamp(0.0, 1.0),
                 _ => {
                     let k = random.below(posed.sh.len());
-                    posed.sh.to_mut()[k][random.below(3)] = extreme(&mut random).clamp(-1e30, 1e30);
+                    posed.sh[k][random.below(3)] = extreme(&mut random).clamp(-1e30, 1e30);
                 }
             }
         }
         let camera = camera(&mut random, 40, 30);
-        let rendered = render(&posed, &camera, &settings(&mut random));
+        let rendered = render(&posed.as_posed(), &camera, &settings(&mut random));
         for pixel in channels(&rendered) {
             prop_assert!(pixel[..3].iter().all(|v| v.is_finite()), "{pixel:?}");
             prop_assert!((0.0..=1.0).contains(&pixel[3]) && pixel[4].is_finite(), "{pixel:?}");
@@ -188,7 +188,7 @@ fn nothing_in_view_leaves_the_background() {
     let mut behind = chosen(&all, &(0..all.len()).collect::<Vec<_>>());
     behind.means.iter_mut().for_each(|mean| *mean = (camera.position() * 2.0).as_vec3());
     for posed in [chosen(&all, &[]), behind] {
-        let rendered = render(&posed, &camera, &settings);
+        let rendered = render(&posed.as_posed(), &camera, &settings);
         assert!(rendered.image.pixels().iter().all(|&p| p == settings.background));
         assert!(rendered.alpha.values().iter().chain(rendered.depth.values()).all(|&v| v == 0.0));
     }
@@ -199,18 +199,19 @@ fn equal_depths_are_drawn_in_index_order() {
     let mut posed = single(Vec3::new(0.0, 0.0, 2.0), Mat3::IDENTITY * 0.1, 0.8);
     posed.means.push(posed.means[0]);
     posed.factors.push(posed.factors[0]);
-    posed.opacities.to_mut().push(0.8);
-    posed.sh.to_mut().push([-1.0, 0.0, 2.0]);
+    posed.opacities.push(0.8);
+    posed.sh.push([-1.0, 0.0, 2.0]);
     let camera = forward_camera(9, 9);
-    let first = render(&posed, &camera, &RenderSettings::default()).image.at(4, 4);
-    let swapped = render(&chosen(&posed, &[1, 0]), &camera, &RenderSettings::default()).image.at(4, 4);
+    let first = render(&posed.as_posed(), &camera, &RenderSettings::default()).image.at(4, 4);
+    let swapped =
+        render(&chosen(&posed, &[1, 0]).as_posed(), &camera, &RenderSettings::default()).image.at(4, 4);
     assert!(first[0] > swapped[0] + 0.2 && first[2] < swapped[2] - 0.2, "{first:?} {swapped:?}");
 }
 
 #[test]
 fn a_single_pixel_has_the_alpha_of_the_peak() {
     let posed = single(Vec3::new(0.0, 0.0, 2.0), Mat3::IDENTITY * 0.5, 0.6);
-    let rendered = render(&posed, &forward_camera(1, 1), &RenderSettings::default());
+    let rendered = render(&posed.as_posed(), &forward_camera(1, 1), &RenderSettings::default());
     assert!((rendered.alpha.at(0, 0) - 0.6).abs() < 1e-6);
     assert!((rendered.depth.at(0, 0) - 1.2).abs() < 2e-6);
 }
@@ -219,12 +220,12 @@ fn a_single_pixel_has_the_alpha_of_the_peak() {
 fn a_splat_larger_than_the_image_covers_all_of_it() {
     for scale in [1e2, 1e4, 1e6] {
         let posed = single(Vec3::new(0.0, 0.0, 2.0), Mat3::IDENTITY * scale, 0.5);
-        let rendered = render(&posed, &forward_camera(300, 50), &RenderSettings::default());
+        let rendered = render(&posed.as_posed(), &forward_camera(300, 50), &RenderSettings::default());
         assert!(rendered.alpha.values().iter().all(|a| (a - 0.5).abs() < 1e-3), "scale {scale}");
     }
     // Beyond f32: dropped, not drawn as garbage.
     let posed = single(Vec3::new(0.0, 0.0, 2.0), Mat3::IDENTITY * 1e18, 0.5);
-    let rendered = render(&posed, &forward_camera(30, 50), &RenderSettings::default());
+    let rendered = render(&posed.as_posed(), &forward_camera(30, 50), &RenderSettings::default());
     assert!(rendered.alpha.values().iter().all(|&a| a == 0.0));
 }
 
@@ -233,7 +234,7 @@ fn a_million_splats_in_one_tile_blend_as_their_product() {
     let count = 1_000_000;
     let one = single(Vec3::new(0.0, 0.0, 2.0), Mat3::IDENTITY * 10.0, 0.005);
     let posed = chosen(&one, &vec![0; count]);
-    let rendered = render(&posed, &forward_camera(16, 16), &RenderSettings::default());
+    let rendered = render(&posed.as_posed(), &forward_camera(16, 16), &RenderSettings::default());
     // Until 0.995^n falls below 1e-4.
     let blended = (1e-4_f64.ln() / 0.995_f64.ln()).floor();
     let expected = 1.0 - 0.995_f64.powf(blended);
@@ -243,11 +244,12 @@ fn a_million_splats_in_one_tile_blend_as_their_product() {
 #[test]
 fn a_renderer_carries_nothing_over_from_frame_to_frame() {
     let mut renderer = Renderer::new();
-    let mut target = render(&scene(1, 10, 3, 3).0, &forward_camera(3, 3), &RenderSettings::default());
+    let mut target =
+        render(&scene(1, 10, 3, 3).0.as_posed(), &forward_camera(3, 3), &RenderSettings::default());
     for (seed, most, width, height) in [(7, 700, 300, 90), (8, 3, 17, 16), (9, 2000, 64, 64), (10, 0, 1, 5)] {
         let (posed, camera, settings) = scene(seed, most, width, height);
-        renderer.render_into(&posed, &camera, &settings, &mut target);
-        assert_eq!(target, render(&posed, &camera, &settings));
+        renderer.render_into(&posed.as_posed(), &camera, &settings, &mut target);
+        assert_eq!(target, render(&posed.as_posed(), &camera, &settings));
     }
 }
 
@@ -255,7 +257,7 @@ fn a_renderer_carries_nothing_over_from_frame_to_frame() {
 fn identity_view_frames_are_no_view_frames() {
     let (mut posed, camera, settings) = scene(3, 100, 50, 50);
     posed.view_frames = None;
-    let without = render(&posed, &camera, &settings);
+    let without = render(&posed.as_posed(), &camera, &settings);
     posed.view_frames = Some(vec![Mat3::IDENTITY; posed.len()]);
-    assert_eq!(render(&posed, &camera, &settings), without);
+    assert_eq!(render(&posed.as_posed(), &camera, &settings), without);
 }

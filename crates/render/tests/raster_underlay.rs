@@ -12,7 +12,7 @@ use glam::{DVec3, Mat3, Vec3};
 use proptest::prelude::*;
 use random_scene::{Random, camera, posed};
 use skinsplat_core::scene::{
-    Camera, ColourClamp, Image, Mask, Posed, PosedGradient, Rendered, RenderedGradient, Underlay,
+    Camera, ColourClamp, Image, Mask, OwnedPosed, PosedGradient, Rendered, RenderedGradient, Underlay,
 };
 use skinsplat_render::definition as reference_splatting;
 use skinsplat_render::definition::{Pane, Parted};
@@ -89,7 +89,7 @@ impl Layer {
 }
 
 struct Scene {
-    posed: Posed<'static>,
+    posed: OwnedPosed,
     camera: Camera,
     settings: RenderSettings,
     layer: Layer,
@@ -116,7 +116,14 @@ impl Scene {
     fn draw(&self, renderer: &mut Renderer) -> (Rendered, Mask) {
         let Self { posed, camera, settings, layer, .. } = self;
         let (mut rendered, mut shown) = (blank(), Mask::filled(1, 1, 7.0));
-        renderer.render_over(posed, camera, settings, &layer.underlay(), &mut rendered, &mut shown);
+        renderer.render_over(
+            &posed.as_posed(),
+            camera,
+            settings,
+            &layer.underlay(),
+            &mut rendered,
+            &mut shown,
+        );
         (rendered, shown)
     }
 
@@ -125,20 +132,29 @@ impl Scene {
         let (rendered, _) = self.draw(renderer);
         let mut gradient = PosedGradient::default();
         let (underlay, exact) = (layer.underlay(), Derivatives::Exact);
-        renderer.backward_over(posed, camera, settings, &underlay, &rendered, upstream, exact, &mut gradient);
+        renderer.backward_over(
+            &posed.as_posed(),
+            camera,
+            settings,
+            &underlay,
+            &rendered,
+            upstream,
+            exact,
+            &mut gradient,
+        );
         gradient
     }
 
     fn parted(&self) -> Vec<Parted> {
-        reference_splatting::parted(&self.posed, &self.camera, &self.settings, &self.layer.panes())
+        reference_splatting::parted(&self.posed.as_posed(), &self.camera, &self.settings, &self.layer.panes())
     }
 
-    fn expected(&self, posed: &Posed, panes: &[Pane], parted: &[Parted]) -> Vec<[f64; 5]> {
-        reference_splatting::render_parted(posed, &self.camera, &self.settings, panes, parted)
+    fn expected(&self, posed: &OwnedPosed, panes: &[Pane], parted: &[Parted]) -> Vec<[f64; 5]> {
+        reference_splatting::render_parted(&posed.as_posed(), &self.camera, &self.settings, panes, parted)
     }
 
     /// The loss in f64 whose derivatives by pixel are `upstream`.
-    fn loss(&self, posed: &Posed, panes: &[Pane], parted: &[Parted]) -> f64 {
+    fn loss(&self, posed: &OwnedPosed, panes: &[Pane], parted: &[Parted]) -> f64 {
         let of = |(i, pixel): (usize, [f64; 5])| {
             let colour = self.upstream.image.pixels()[i];
             let alpha = self.upstream.alpha.as_ref().map_or(0.0, |alpha| alpha.values()[i]);
@@ -175,13 +191,13 @@ fn forward_camera(size: u32) -> Camera {
 }
 
 /// One wide red Gaussian two metres ahead.
-fn ahead(opacity: f32) -> Posed<'static> {
-    Posed {
+fn ahead(opacity: f32) -> OwnedPosed {
+    OwnedPosed {
         means: vec![Vec3::new(0.0, 0.0, 2.0)],
         factors: vec![Mat3::IDENTITY * 0.5],
-        opacities: vec![opacity].into(),
+        opacities: vec![opacity],
         sh_degree: 0,
-        sh: vec![[0.5 / 0.282_094_8, -0.5 / 0.282_094_8, -0.5 / 0.282_094_8]].into(),
+        sh: vec![[0.5 / 0.282_094_8, -0.5 / 0.282_094_8, -0.5 / 0.282_094_8]],
         view_frames: None,
         colour_clamp: ColourClamp::NonNegative,
         rotations: None,
@@ -198,7 +214,14 @@ fn a_layer_in_front_hides_one_behind_is_seen_through_and_soft_edges_mix() {
         let layer = Layer::even(&camera, green, coverage, depth);
         let (mut rendered, mut shown) = (blank(), Mask::filled(1, 1, 0.0));
         let underlay = layer.underlay();
-        Renderer::new().render_over(&posed, &camera, &settings, &underlay, &mut rendered, &mut shown);
+        Renderer::new().render_over(
+            &posed.as_posed(),
+            &camera,
+            &settings,
+            &underlay,
+            &mut rendered,
+            &mut shown,
+        );
         (channels(&rendered)[0], shown.values()[0])
     };
     let close = |(found, shown): ([f32; 5], f32), expected: [f32; 5], seen: f32| {
@@ -225,14 +248,14 @@ fn little_light_is_enough_for_a_layer_but_not_for_a_splat() {
     for z in [2.1, 2.2] {
         posed.means.push(Vec3::new(0.0, 0.0, z));
         posed.factors.push(Mat3::IDENTITY * 0.5);
-        posed.opacities.to_mut().push(0.99);
-        posed.sh.to_mut().push([0.5 / 0.282_094_8; 3]);
+        posed.opacities.push(0.99);
+        posed.sh.push([0.5 / 0.282_094_8; 3]);
     }
     let layer = Layer::even(&camera, [0.0, 1.0, 0.0], 1.0, 3.0);
     let (mut rendered, mut shown) = (blank(), Mask::filled(1, 1, 0.0));
     let underlay = layer.underlay();
     let settings = RenderSettings::default();
-    Renderer::new().render_over(&posed, &camera, &settings, &underlay, &mut rendered, &mut shown);
+    Renderer::new().render_over(&posed.as_posed(), &camera, &settings, &underlay, &mut rendered, &mut shown);
     // The first leaves a hundredth, the second would leave a ten-thousandth less a rounding: whatever it does, the rest
     // is the layer's.
     let red = channels(&rendered)[0];
@@ -254,7 +277,14 @@ fn a_drawn_mesh_hides_what_lies_behind_it() {
         let (mut rendered, mut shown) = (blank(), Mask::filled(1, 1, 0.0));
         let underlay = drawing.underlay();
         let settings = RenderSettings::default();
-        Renderer::new().render_over(&posed, &camera, &settings, &underlay, &mut rendered, &mut shown);
+        Renderer::new().render_over(
+            &posed.as_posed(),
+            &camera,
+            &settings,
+            &underlay,
+            &mut rendered,
+            &mut shown,
+        );
         rendered.image
     };
     // On the middle column the triangle's depth rises from about 1.7 to 2.3 over the image.
@@ -317,7 +347,7 @@ proptest! {
     #[test]
     fn where_nothing_is_covered_the_pixel_is_as_without_a_layer(seed: u64, width in 1_u32..300, height in 1_u32..50) {
         let mut scene = Scene::new(seed, 500, width, height);
-        let plain = bits(&render(&scene.posed, &scene.camera, &scene.settings));
+        let plain = bits(&render(&scene.posed.as_posed(), &scene.camera, &scene.settings));
         let (over, shown) = scene.draw(&mut Renderer::new());
         let over = bits(&over);
         for (i, &coverage) in scene.layer.coverage.values().iter().enumerate() {
@@ -331,9 +361,9 @@ proptest! {
         let mut gradient = PosedGradient::default();
         let mut renderer = Renderer::new();
         let Scene { posed, camera, settings, upstream, .. } = &scene;
-        let rendered = renderer.render(posed, camera, settings);
+        let rendered = renderer.render(&posed.as_posed(), camera, settings);
         let exact = Derivatives::Exact;
-        renderer.backward(posed, camera, settings, &rendered, upstream, exact, &mut gradient);
+        renderer.backward(&posed.as_posed(), camera, settings, &rendered, upstream, exact, &mut gradient);
         prop_assert_eq!(scene.gradient(&mut Renderer::new()), gradient);
     }
 }
@@ -384,7 +414,7 @@ fn the_layers_colour_has_the_derivative_that_is_shown() {
 fn long_lists_have_the_image_and_the_derivatives_of_the_definition() {
     let mut scene = Scene::new(17, 20_000, 64, 16);
     scene.posed.factors.iter_mut().for_each(|factor| *factor *= 0.2);
-    scene.posed.opacities.to_mut().iter_mut().for_each(|opacity| *opacity *= 0.05);
+    scene.posed.opacities.iter_mut().for_each(|opacity| *opacity *= 0.05);
     let mut random = Random(4);
     for depth in scene.layer.depth.values_mut() {
         *depth = random.between(0.3, 7.0) as f32;
@@ -404,11 +434,9 @@ fn long_lists_have_the_image_and_the_derivatives_of_the_definition() {
     drawn.dedup();
     let some: Vec<usize> = drawn.into_iter().step_by(400).collect();
     assert!(some.len() > 10);
-    let loss = |p: &Posed<'static>| scene.loss(p, &panes, &parted);
-    let expected: Vec<f64> = some
-        .iter()
-        .map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities.to_mut()[i]))
-        .collect();
+    let loss = |p: &OwnedPosed| scene.loss(p, &panes, &parted);
+    let expected: Vec<f64> =
+        some.iter().map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i])).collect();
     let found: Vec<f32> = some.iter().map(|&i| gradient.opacities[i]).collect();
     assert_close("opacities", &found, &expected, 1e-4);
 }

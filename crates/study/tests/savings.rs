@@ -7,7 +7,7 @@ mod rig;
 use glam::DVec3;
 use proptest::prelude::{ProptestConfig, any, prop_assert, prop_assert_eq, proptest};
 use skinsplat_core::scene::{Camera, PosedBody};
-use skinsplat_posing::{BoundAvatar, PoseBuffers, Strategy, pose, pose_seen};
+use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy, pose};
 use skinsplat_render::splat::{RenderSettings, Renderer};
 use skinsplat_study::trade::savings::{Options, Same, measure};
 
@@ -56,13 +56,13 @@ proptest! {
         for spec in ["quaternion-average", "quaternion-average+colour=view-rotation", "lbs", "view-canonical"] {
             let strategy: Strategy = spec.parse().unwrap();
             let mut renderer = Renderer::new();
-            let all = pose(&bound, &posed_body, &strategy).unwrap();
+            // Memory of another pose must not shine through.
+            let mut poser = Poser::new();
+            let all = poser.pose(&bound, &posed_body, &strategy, &PoseOptions::default()).unwrap();
             let full = renderer.render(&all, &camera, &settings);
             let visible = renderer.visible();
-            // Memory of another pose must not shine through.
-            let mut buffers = PoseBuffers::default();
-            buffers.reclaim(all);
-            let seen = pose_seen(&bound, &posed_body, &strategy, &camera, &mut buffers).unwrap();
+            let options = PoseOptions { seen_by: Some(&camera), ..PoseOptions::default() };
+            let seen = poser.pose(&bound, &posed_body, &strategy, &options).unwrap();
             prop_assert!(full == renderer.render(&seen, &camera, &settings), "{spec}");
             prop_assert_eq!(visible, renderer.visible());
         }
@@ -84,7 +84,7 @@ proptest! {
         for strategy in [Strategy::preset("quaternion-average").unwrap(), Strategy::preset("lbs").unwrap()] {
             let image = |bound: &BoundAvatar| {
                 let posed = pose(bound, &posed_body, &strategy).unwrap();
-                Renderer::new().render(&posed, &camera, &RenderSettings::default())
+                Renderer::new().render(&posed.as_posed(), &camera, &RenderSettings::default())
             };
             prop_assert!(image(&stored) == image(&needed), "{strategy}");
         }

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use skinsplat_core::math::rotation::{angle_between, conjugate, multiply};
 use skinsplat_core::math::{Quaternion, average, rotation};
 use skinsplat_core::scene::{Avatar, Binding, Pose, PosedBody, RestBody, SkinWeights};
-use skinsplat_posing::{BoundAvatar, JointLift, PoseBuffers, RotationChoice, Strategy, pose_lifted};
+use skinsplat_posing::{BoundAvatar, JointLift, PoseOptions, Poser, RotationChoice, Strategy};
 use skinsplat_study::stress::table::{Cell, Findings, Verdict};
 use skinsplat_study::stress::{Report, Section};
 
@@ -89,8 +89,10 @@ fn jump(body: &RestBody, bound: &BoundAvatar, poses: &[Pose], rotation: &str, fo
     for pose in poses {
         let posed_body = PosedBody::new(body, pose).unwrap();
         let next = JointLift::next(lift.as_ref().filter(|_| follows), &posed_body);
-        let posed = pose_lifted(bound, &posed_body, &strategy, &next, &mut PoseBuffers::default()).unwrap();
-        let turns = posed.rotations.unwrap();
+        let (mut poser, options) =
+            (Poser::new(), PoseOptions { lift: Some(&next), ..PoseOptions::default() });
+        let posed = poser.pose(bound, &posed_body, &strategy, &options).unwrap();
+        let turns = posed.rotations.unwrap().to_vec();
         for (a, b) in before.iter().flatten().zip(&turns) {
             worst = worst.max(angle_between(a.map(f64::from), b.map(f64::from)).to_degrees());
         }
@@ -168,7 +170,8 @@ proptest! {
                 rotation: rotation.parse().unwrap(),
                 ..Strategy::preset("quaternion-average").unwrap()
             };
-            pose_lifted(&bound, &posed_body, &strategy, &lift, &mut PoseBuffers::default()).unwrap().rotations.unwrap()
+            let options = PoseOptions { lift: Some(&lift), ..PoseOptions::default() };
+            Poser::new().pose(&bound, &posed_body, &strategy, &options).unwrap().rotations.unwrap().to_vec()
         };
         for (a, b) in of("lifted-sum").iter().zip(of("closed-form")) {
             let off = angle_between(a.map(f64::from), b.map(f64::from));

@@ -114,7 +114,7 @@ impl Skeleton {
     }
 
     /// Rotation of every node relative to the rest pose, scales left out.
-    fn turns(&self, pose: &Pose) -> Vec<DQuat> {
+    fn rotations_from_rest(&self, pose: &Pose) -> Vec<DQuat> {
         let chained = |locals: &[LocalTransform]| {
             let mut world = vec![DQuat::IDENTITY; self.len()];
             for &node in &self.order {
@@ -226,6 +226,13 @@ impl RestBody {
             return Err(SceneError::new(format!("posedirs[{k}]"), "wrong length", format!("{v} offsets")));
         }
         Ok(())
+    }
+
+    /// The skinning weights of a point of a face, from those of its corners, as sorted (joint, weight) pairs. `barycentric`
+    /// are at least 0 and sum to one.
+    pub fn weights_at(&self, face: u32, barycentric: [f64; 3]) -> Vec<(usize, f32)> {
+        let corners = self.faces[face as usize];
+        self.weights.mixed(&[0, 1, 2].map(|k: usize| (corners[k] as usize, barycentric[k])))
     }
 
     /// The same body with every vertex moved along its rest normal (clothing), metres. Joints stay where they are.
@@ -362,10 +369,10 @@ impl<'a> PosedBody<'a> {
             return Err(SceneError::new("transl", "NaN or infinite", "finite metres"));
         }
         let world = skeleton.world_transforms(pose);
-        let turns = std::cell::OnceCell::new();
+        let rotations = std::cell::OnceCell::new();
         let joint = |(index, (world, bind)): (usize, (&DAffine3, &DAffine3))| {
             let skin = *world * *bind;
-            let chained = || turns.get_or_init(|| skeleton.turns(pose))[index];
+            let chained = || rotations.get_or_init(|| skeleton.rotations_from_rest(pose))[index];
             let rotation = || unique_nearest_rotation(skin.matrix3).unwrap_or_else(chained);
             JointTransform {
                 linear: skin.matrix3,

@@ -7,6 +7,7 @@ pub mod gradient;
 pub mod image;
 pub mod pose;
 pub mod posed;
+pub mod rasterizer;
 pub mod skin_weights;
 
 pub use avatar::{Avatar, Binding, FaceBinding, Gaussians};
@@ -15,7 +16,7 @@ pub use camera::Camera;
 pub use gradient::{AvatarGradient, PosedGradient, RenderedGradient};
 pub use image::{Image, Mask};
 pub use pose::{LocalTransform, Pose};
-pub use posed::{ColourClamp, Posed, Rendered, Underlay};
+pub use posed::{ColourClamp, OwnedPosed, Posed, Rendered, Underlay};
 pub use skin_weights::SkinWeights;
 
 /// A scene value that breaks an invariant. `field` names the part, `expected` says what it should have been; the data

@@ -2,7 +2,6 @@
 
 use super::{Gaussians, Image};
 use glam::{Mat3, Vec3};
-use std::borrow::Cow;
 
 /// How a colour leaves the SH evaluation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,28 +13,29 @@ pub enum ColourClamp {
     Unit,
 }
 
-/// Gaussians in world space, ready to draw. After `strategy`, nobody asks which strategy it was.
-#[derive(Clone, Debug, PartialEq)]
+/// Gaussians in world space, ready to draw: a view of arrays that anybody may own. After posing, nobody asks which strategy
+/// it was. Every slice has one entry per Gaussian, unless it says otherwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posed<'a> {
     /// World positions, metres.
-    pub means: Vec<Vec3>,
+    pub means: &'a [Vec3],
     /// M per Gaussian, with Σ = M Mᵀ: a rotated (`R diag(s)`) and an affine (`B R_c diag(s)`) covariance are the same
     /// thing to the renderer.
-    pub factors: Vec<Mat3>,
+    pub factors: &'a [Mat3],
     /// In \[0, 1\], after the sigmoid.
-    pub opacities: Cow<'a, [f32]>,
+    pub opacities: &'a [f32],
     /// SH degree of `sh`, 0 to 3.
     pub sh_degree: usize,
     /// `(sh_degree + 1)^2` RGB coefficients per Gaussian, 3DGS basis and order.
-    pub sh: Cow<'a, [[f32; 3]]>,
+    pub sh: &'a [[f32; 3]],
     /// F per Gaussian: SH are read along `normalize(F d)` for the direction d from the camera to the Gaussian. `None`
     /// reads them along d itself.
-    pub view_frames: Option<Vec<Mat3>>,
+    pub view_frames: Option<&'a [Mat3]>,
     /// How colours are clamped.
     pub colour_clamp: ColourClamp,
     /// The posed unit quaternion (w, x, y, z) of each Gaussian where the strategy has one (`factors` are then
     /// `R(q) diag(s)`); `None` for affine or improper covariances. For export only: renderers read `factors`.
-    pub rotations: Option<Vec<[f32; 4]>>,
+    pub rotations: Option<&'a [[f32; 4]]>,
 }
 
 impl Posed<'_> {
@@ -48,11 +48,46 @@ impl Posed<'_> {
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }
+
+    /// A copy that owns its arrays.
+    pub fn into_owned(self) -> OwnedPosed {
+        OwnedPosed {
+            means: self.means.to_vec(),
+            factors: self.factors.to_vec(),
+            opacities: self.opacities.to_vec(),
+            sh_degree: self.sh_degree,
+            sh: self.sh.to_vec(),
+            view_frames: self.view_frames.map(<[_]>::to_vec),
+            colour_clamp: self.colour_clamp,
+            rotations: self.rotations.map(<[_]>::to_vec),
+        }
+    }
 }
 
-impl<'a> Posed<'a> {
+/// A [`Posed`] that is kept, or changed: the same fields, owned.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OwnedPosed {
+    /// See [`Posed::means`].
+    pub means: Vec<Vec3>,
+    /// See [`Posed::factors`].
+    pub factors: Vec<Mat3>,
+    /// See [`Posed::opacities`].
+    pub opacities: Vec<f32>,
+    /// See [`Posed::sh_degree`].
+    pub sh_degree: usize,
+    /// See [`Posed::sh`].
+    pub sh: Vec<[f32; 3]>,
+    /// See [`Posed::view_frames`].
+    pub view_frames: Option<Vec<Mat3>>,
+    /// See [`Posed::colour_clamp`].
+    pub colour_clamp: ColourClamp,
+    /// See [`Posed::rotations`].
+    pub rotations: Option<Vec<[f32; 4]>>,
+}
+
+impl OwnedPosed {
     /// The Gaussians as they stand, without a body: what any splat viewer draws.
-    pub fn from_static(gaussians: &'a Gaussians) -> Self {
+    pub fn from_static(gaussians: &Gaussians) -> Self {
         let rotations = gaussians.unit_rotations();
         let factors = rotations
             .iter()
@@ -65,13 +100,37 @@ impl<'a> Posed<'a> {
         Self {
             means: gaussians.means.clone(),
             factors,
-            opacities: Cow::Owned(gaussians.opacities()),
+            opacities: gaussians.opacities(),
             sh_degree: gaussians.sh_degree,
-            sh: Cow::Borrowed(&gaussians.sh),
+            sh: gaussians.sh.clone(),
             view_frames: None,
             colour_clamp: ColourClamp::NonNegative,
             rotations: Some(rotations),
         }
+    }
+
+    /// What a renderer draws.
+    pub fn as_posed(&self) -> Posed<'_> {
+        Posed {
+            means: &self.means,
+            factors: &self.factors,
+            opacities: &self.opacities,
+            sh_degree: self.sh_degree,
+            sh: &self.sh,
+            view_frames: self.view_frames.as_deref(),
+            colour_clamp: self.colour_clamp,
+            rotations: self.rotations.as_deref(),
+        }
+    }
+
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.means.len()
+    }
+
+    /// True if there are none.
+    pub fn is_empty(&self) -> bool {
+        self.means.is_empty()
     }
 }
 

@@ -60,8 +60,7 @@ fn nearest_weights(
         faces.ok_or_else(|| SceneError::new("body.faces", "none", "faces to take skinning weights from"))?;
     let row = |mean: &Vec3| {
         let point = faces.nearest(mean.as_dvec3(), None);
-        let corners = body.faces[point.face as usize];
-        body.weights.mixed(&[0, 1, 2].map(|k: usize| (corners[k] as usize, point.barycentric[k])))
+        body.weights_at(point.face, point.barycentric)
     };
     let rows: Vec<_> = means.par_iter().map(row).collect();
     SkinWeights::from_rows(rows, body.skeleton.num_joints())

@@ -34,7 +34,7 @@ use skinsplat_core::scene::{
 };
 use skinsplat_data::sequence::Sequence;
 use skinsplat_posing::nearest::NearestFace;
-use skinsplat_posing::{BoundAvatar, Strategy, pose, pose_backward};
+use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
 use skinsplat_render::mesh::Drawing;
 use skinsplat_render::splat::{Derivatives, RenderSettings, Renderer};
 use std::ops::ControlFlow;
@@ -89,6 +89,7 @@ pub struct Trainer<'a> {
 
 /// Memory that is kept from iteration to iteration.
 struct Scratch {
+    poser: Poser,
     renderer: Renderer,
     rendered: Rendered,
     truth: Image,
@@ -287,15 +288,16 @@ impl<'a> Trainer<'a> {
         }
         let frame = self.frames.of_iteration(self.iteration as usize, &mut self.warnings)?;
         let body = PosedBody::new(&self.sequence.body, frame.pose).map_err(Error::scene(self.sequence))?;
-        let posed = pose(&self.bound, &body, &self.strategy).map_err(&in_strategy)?;
+        let (strategy, posing) = (&self.strategy, PoseOptions::default());
+        let Scratch { poser, renderer, rendered, truth, losses, of_rendered, of_posed, of_avatar } =
+            &mut self.scratch;
+        let posed = poser.pose(&self.bound, &body, strategy, &posing).map_err(&in_strategy)?;
         let background = background(recipe.background, self.options.seed, self.iteration);
         let settings = RenderSettings { background, antialiased: false };
-        let scratch = &mut self.scratch;
         let in_scene = Error::scene(self.sequence);
         let drawing = self.layer.as_ref().map(|layer| layer.draw(frame.pose, frame.camera));
         let drawing = drawing.transpose().map_err(&in_scene)?;
         let underlay = drawing.as_ref().map(Drawing::underlay);
-        let Scratch { renderer, rendered, .. } = scratch;
         match (&underlay, &mut self.layer) {
             (Some(underlay), Some(layer)) => {
                 let shown = &mut layer.shown;
@@ -303,12 +305,10 @@ impl<'a> Trainer<'a> {
             }
             _ => renderer.render_into(&posed, frame.camera, &settings, rendered),
         }
-        composite(&frame.truth.rgb, &frame.truth.alpha, background, &mut scratch.truth);
-        let Rendered { image, alpha, .. } = &scratch.rendered;
+        composite(&frame.truth.rgb, &frame.truth.alpha, background, truth);
+        let Rendered { image, alpha, .. } = &*rendered;
         let weights = Weights { ssim: recipe.loss.ssim, silhouette: recipe.loss.silhouette };
-        let truth = (&scratch.truth, &frame.truth.alpha);
-        let loss = scratch.losses.frame((image, alpha), truth, &weights, &mut scratch.of_rendered);
-        let Scratch { renderer, rendered, of_rendered, of_posed, .. } = scratch;
+        let loss = losses.frame((image, alpha), (truth, &frame.truth.alpha), &weights, of_rendered);
         let (camera, exact) = (frame.camera, Derivatives::Exact);
         match &underlay {
             Some(underlay) => renderer.backward_over(
@@ -327,12 +327,11 @@ impl<'a> Trainer<'a> {
             layer.step(frame.pose, camera, &of_rendered.image).map_err(&in_scene)?;
         }
         let Avatar { gaussians, binding } = &self.parameters.avatar;
-        scratch.of_avatar.reset(gaussians, matches!(binding, Binding::Face(_)));
-        let upstream = &scratch.of_posed;
-        pose_backward(&self.bound, &body, &self.strategy, gaussians, upstream, &mut scratch.of_avatar)
+        of_avatar.reset(gaussians, matches!(binding, Binding::Face(_)));
+        poser
+            .backward(&self.bound, &body, strategy, &posing, gaussians, of_posed, of_avatar)
             .map_err(&in_strategy)?;
         let frame_name = frame.name.to_owned();
-        drop(posed);
         self.finish(loss, &frame_name)
     }
 
@@ -387,6 +386,7 @@ impl Scratch {
         let image = || Image::filled(1, 1, [0.0; 3]);
         let mask = || Mask::filled(1, 1, 0.0);
         Self {
+            poser: Poser::new(),
             renderer: Renderer::new(),
             rendered: Rendered { image: image(), alpha: mask(), depth: mask() },
             truth: image(),

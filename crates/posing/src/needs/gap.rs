@@ -1,9 +1,10 @@
 //! The smallest gap of the eigenvalues over a motion: the bound that pairs of joints give, and the value itself by branch
 //! and bound: only Gaussians whose group could be lower than the lowest found so far have their eigenvalues computed.
 
+use super::super::groups::{self, Group};
 use super::super::layout::Chunk;
-use super::groups::{self, Group};
-use super::{Extreme, PoseBounds};
+use super::pose::PoseBounds;
+use super::values::Extreme;
 use skinsplat_core::math::Quaternion;
 use skinsplat_core::math::average::eigen::SymmetricEigen;
 

@@ -2,18 +2,19 @@
 //! joints of a Gaussian turn against each other, and for every cheaper solver a proved bound on how far it can be from the
 //! exact average. From pairs of joints and summaries of the weights; no Gaussian is posed.
 //!
-//! `theory` has the proofs, `groups` what is remembered of the weights, [`PoseBounds`] a pose, [`Needs`] a motion.
+//! `theory` has the proofs, [`PoseBounds`] a pose, [`Needs`] a motion.
 
 mod gap;
-mod groups;
 mod pose;
 mod theory;
+mod values;
 mod verdict;
 
-pub(super) use groups::{Group, groups};
 pub use pose::PoseBounds;
+pub use values::{Bound, Degrees, Extreme};
 pub use verdict::Verdict;
 
+use super::groups::{self, Group};
 use super::{BoundAvatar, RotationChoice};
 use rayon::prelude::*;
 use skinsplat_core::math::rotation;
@@ -54,16 +55,6 @@ pub struct Needs {
     pub verdict: Verdict,
 }
 
-/// A value and the pose in which it was found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Extreme {
-    /// Degrees, or a gap in \[0, 1\].
-    pub value: f64,
-    /// Index of the pose.
-    pub pose: usize,
-}
-
 /// Two joints that share a Gaussian.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -74,29 +65,6 @@ pub struct Pair {
     pub gaussians: u64,
     /// Their largest angle, degrees.
     pub worst_angle: Extreme,
-}
-
-/// How far a rotation choice can be from the exact average.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Bound {
-    /// The choice.
-    pub rotation: RotationChoice,
-    /// At least the largest angle, rounding to `f32` allowed for.
-    pub degrees: Degrees,
-    /// The part that is proved: in exact arithmetic.
-    pub proved: Degrees,
-}
-
-/// An angle in degrees; infinite (`null` in JSON) where nothing is proved.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-pub struct Degrees(pub f64);
-
-#[cfg(feature = "serde")]
-impl serde::Serialize for Degrees {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if self.0.is_finite() { serializer.serialize_f64(self.0) } else { serializer.serialize_none() }
-    }
 }
 
 /// The choices that [`Needs::bounds`] lists unless others are asked for.
@@ -196,9 +164,10 @@ impl Needs {
     pub fn parse_tolerance(text: &str) -> Result<f64, String> {
         let smallest = Self::smallest_tolerance();
         let usable = |degrees: &f64| degrees.is_finite() && *degrees >= smallest;
-        text.parse().ok().filter(usable).ok_or_else(|| {
-            format!("a tolerance in degrees such as 0.5, finite and at least {smallest:.2e}")
-        })
+        text.parse()
+            .ok()
+            .filter(usable)
+            .ok_or_else(|| format!("a tolerance in degrees such as 0.5, finite and at least {smallest:.2e}"))
     }
 
     /// The choices of [`LISTED`].

@@ -1,7 +1,8 @@
 //! What is enough at a tolerance.
 
 use super::super::{LbsProjection, RotationChoice};
-use super::{Bound, Degrees, PoseBounds};
+use super::pose::PoseBounds;
+use super::values::{Bound, Degrees};
 use skinsplat_core::math::average::{Solver, Start};
 use std::fmt;
 
@@ -56,16 +57,6 @@ impl Verdict {
             power_steps: (0..=MOST_STEPS).find(|&n| over(steps(n)) <= tolerance),
             gram_schmidt: gram_schmidt <= tolerance,
             gram_schmidt_degrees: Degrees(gram_schmidt),
-        }
-    }
-}
-
-impl fmt::Display for Degrees {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            angle if !angle.is_finite() => f.write_str("no bound"),
-            angle if angle < 0.01 => write!(f, "{angle:.1e}°"),
-            angle => write!(f, "{angle:.3}°"),
         }
     }
 }

@@ -7,8 +7,7 @@
 
 use super::super::blend::{self, Blend};
 use super::super::joints::Joints;
-use super::super::layout::{LANES, Lanes};
-use super::put;
+use super::super::lanes::{LANES, Lanes, identity, put, splat};
 use skinsplat_core::math::average::{Solver, Start, average_rotation, lanes};
 use skinsplat_core::math::{Quaternion, rotation};
 
@@ -26,7 +25,7 @@ pub(super) fn average(
     solver: Solver,
 ) -> [Lanes; 4] {
     match (indices, solver) {
-        ([], _) => splat(rotation::identity()),
+        ([], _) => identity(),
         (&[joint], _) => splat(joints.rotation[usize::from(joint)]),
         (&[a, b], Solver::ClosedForm) => {
             let (mut average, settled) = pair(joints, [a, b], [&weights[0], &weights[1]]);
@@ -127,7 +126,7 @@ impl pulp::NullaryFnOnce for Dominant<'_> {
 /// Any solver.
 #[inline(never)]
 fn one_by_one(joints: &Joints, indices: &[u16], weights: &[Lanes], solver: Solver) -> [Lanes; 4] {
-    let mut average = splat(rotation::identity());
+    let mut average = identity();
     for lane in 0..LANES {
         put(&mut average, lane, of_lane(joints, indices, weights, lane, solver));
     }
@@ -215,10 +214,4 @@ pub(super) fn with_bones<R>(
         (quats[k], weights[k]) = (quat, weight);
     }
     f(&quats[..n], &weights[..n])
-}
-
-/// The same quaternion in every lane.
-#[inline(always)]
-pub(super) fn splat(q: Quaternion<f32>) -> [Lanes; 4] {
-    [[q[0]; LANES], [q[1]; LANES], [q[2]; LANES], [q[3]; LANES]]
 }

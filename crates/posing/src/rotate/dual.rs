@@ -1,9 +1,7 @@
 //! Dual-quaternion blending of a block.
 
 use super::super::joints::Joints;
-use super::super::layout::{LANES, Lanes};
-use super::average::splat;
-use super::{put, take};
+use super::super::lanes::{LANES, Lanes, identity, put, splat, take};
 use skinsplat_core::math::dual_quaternion::{self, DualQuaternion};
 use skinsplat_core::math::rotation;
 
@@ -57,7 +55,7 @@ fn lane_by_lane(
     for (motion, &joint) in motions.iter_mut().zip(indices) {
         *motion = joints.motion[usize::from(joint)];
     }
-    let mut blended = Motions { real: splat(rotation::identity()), dual: splat([0.0; 4]) };
+    let mut blended = Motions { real: identity(), dual: splat([0.0; 4]) };
     for lane in 0..LANES {
         own.iter_mut().zip(weights).for_each(|(own, weight)| *own = weight[lane]);
         if let Some(motion) = dual_quaternion::blend(motions, own) {

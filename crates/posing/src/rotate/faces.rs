@@ -3,13 +3,12 @@
 //! What is degenerate falls back, deterministically, on the quaternion average of the skinning weights: a Gaussian on a
 //! face without area in either pose, a vertex all of whose faces are, a sum of quaternions that cancels.
 
-use super::super::FaceFrame;
-use super::super::face_frame;
+use super::super::face_frame::{self, FaceFrame};
 use super::super::joints::Joints;
-use super::super::layout::{LANES, Lanes};
-use super::super::seat::{Seat, Surface};
-use super::average::{splat, with_bones};
-use super::{BlockInput, put};
+use super::super::lanes::{LANES, Lanes, identity, put};
+use super::super::surface::{Embedding, Surface};
+use super::BlockInput;
+use super::average::with_bones;
 use rayon::prelude::*;
 use skinsplat_core::math::average::{Solver, average_rotation};
 use skinsplat_core::math::rotation::SignPolicy;
@@ -20,37 +19,38 @@ use skinsplat_core::scene::PosedBody;
 const CANCELLED: f32 = 1e-6;
 
 /// The rotation of every used face between the rest pose and a posed one.
-pub(in super::super) struct FaceTurns<'a> {
+pub(crate) struct FaceRotations<'a> {
+    pub(crate) kind: FaceFrame,
     /// Per face; `None` for unused and degenerate ones.
-    turns: Vec<Option<Quaternion<f32>>>,
-    seats: &'a [Seat],
+    quats: Vec<Option<Quaternion<f32>>>,
+    embeddings: &'a [Embedding],
 }
 
-impl<'a> FaceTurns<'a> {
+impl<'a> FaceRotations<'a> {
     /// Compares posed and rest frames.
     pub(super) fn new(kind: FaceFrame, body: &PosedBody<'_>, surface: &'a Surface) -> Self {
-        let turns = face_turns(kind, body, surface, |face| surface.face_used[face]);
-        Self { turns, seats: &surface.seats }
+        let quats = face_rotations(kind, body, surface, |face| surface.face_used[face]);
+        Self { kind, quats, embeddings: &surface.embeddings }
     }
 
-    /// The turns of a block.
+    /// R of each lane.
     #[inline(never)]
     pub(super) fn of_block(&self, input: &BlockInput<'_>) -> [Lanes; 4] {
-        let mut turns = splat(rotation::identity());
+        let mut relative = identity();
         for lane in 0..LANES {
-            let turn = self.of_gaussian(input.gaussian(lane));
-            put(&mut turns, lane, turn.unwrap_or_else(|| input.average_of(lane)));
+            let quat = self.of_gaussian(input.gaussian(lane));
+            put(&mut relative, lane, quat.unwrap_or_else(|| input.average_of(lane)));
         }
-        turns
+        relative
     }
 
-    /// The turn of a Gaussian's face.
-    pub(in super::super) fn of_gaussian(&self, gaussian: usize) -> Option<Quaternion<f32>> {
-        self.turns[self.seats[gaussian].face as usize]
+    /// The rotation of a Gaussian's face.
+    pub(crate) fn of_gaussian(&self, gaussian: usize) -> Option<Quaternion<f32>> {
+        self.quats[self.embeddings[gaussian].face as usize]
     }
 }
 
-fn face_turns(
+fn face_rotations(
     kind: FaceFrame,
     body: &PosedBody<'_>,
     surface: &Surface,
@@ -58,22 +58,22 @@ fn face_turns(
 ) -> Vec<Option<Quaternion<f32>>> {
     let vertices = &body.mesh().vertices;
     let (kind, rest) = surface.faces.frames(kind);
-    let turn = |face: usize| {
+    let rotation = |face: usize| {
         if !needed(face) {
             return None;
         }
         let corners = surface.faces.corners[face].map(|v| vertices[v as usize]);
-        Some(face_frame::turn(&face_frame::frame(kind, corners)?, rest[face].as_ref()?))
+        Some(face_frame::rotation_between(&face_frame::frame(kind, corners)?, rest[face].as_ref()?))
     };
-    (0..surface.faces.corners.len()).into_par_iter().with_min_len(1024).map(turn).collect()
+    (0..surface.faces.corners.len()).into_par_iter().with_min_len(1024).map(rotation).collect()
 }
 
 /// A rotation per used vertex, and how three of them become one.
-pub(in super::super) struct VertexTurns<'a> {
+pub(crate) struct VertexRotations<'a> {
     /// Per vertex; `None` for unused and degenerate ones.
-    turns: Vec<Option<Quaternion<f32>>>,
+    quats: Vec<Option<Quaternion<f32>>>,
     combine: Combine,
-    seats: &'a [Seat],
+    embeddings: &'a [Embedding],
 }
 
 enum Combine {
@@ -83,7 +83,7 @@ enum Combine {
     Sum(SignPolicy),
 }
 
-impl<'a> VertexTurns<'a> {
+impl<'a> VertexRotations<'a> {
     /// Eq. 7 at every used vertex with its own skinning weights.
     pub(super) fn averaged(
         solver: Solver,
@@ -91,7 +91,7 @@ impl<'a> VertexTurns<'a> {
         body: &PosedBody<'_>,
         surface: &'a Surface,
     ) -> Self {
-        let turn = |vertex: usize| {
+        let rotation = |vertex: usize| {
             let (indices, weights) = body.rest.weights.row(vertex);
             if !surface.vertex_used[vertex] {
                 return None;
@@ -103,8 +103,8 @@ impl<'a> VertexTurns<'a> {
             let average = with_bones(bones, |quats, weights| average_rotation(quats, weights, solver));
             average.map(|q| q.map(|c| c as f32))
         };
-        let turns = (0..surface.vertex_used.len()).into_par_iter().with_min_len(512).map(turn).collect();
-        Self { turns, combine: Combine::Average(solver), seats: &surface.seats }
+        let quats = (0..surface.vertex_used.len()).into_par_iter().with_min_len(512).map(rotation).collect();
+        Self { quats, combine: Combine::Average(solver), embeddings: &surface.embeddings }
     }
 
     /// SplattingAvatar: the sum of the rotations of all faces around a vertex, weighted by their area at rest, under a
@@ -112,13 +112,13 @@ impl<'a> VertexTurns<'a> {
     pub(super) fn summed(policy: SignPolicy, body: &PosedBody<'_>, surface: &'a Surface) -> Self {
         let faces = &surface.faces;
         let used = |face: usize| faces.corners[face].iter().any(|&v| surface.vertex_used[v as usize]);
-        let face_turns = face_turns(FaceFrame::SplattingAvatar, body, surface, used);
+        let face_rotations = face_rotations(FaceFrame::SplattingAvatar, body, surface, used);
         let mut sums = vec![([0.0f32; 4], None); surface.vertex_used.len()];
-        for (face, turn) in face_turns.iter().enumerate() {
-            let Some(turn) = *turn else { continue };
+        for (face, quat) in face_rotations.iter().enumerate() {
+            let Some(quat) = *quat else { continue };
             for &vertex in &faces.corners[face] {
                 let (sum, first) = &mut sums[vertex as usize];
-                let signed = policy.apply(turn, *first.get_or_insert(turn));
+                let signed = policy.apply(quat, *first.get_or_insert(quat));
                 for k in 0..4 {
                     sum[k] += faces.areas[face] * signed[k];
                 }
@@ -126,37 +126,37 @@ impl<'a> VertexTurns<'a> {
         }
         let areas = &faces.areas;
         let largest = areas.iter().copied().fold(0.0f32, f32::max);
-        let turns = sums.into_iter().map(|(sum, _)| unit(sum, CANCELLED * largest)).collect();
-        Self { turns, combine: Combine::Sum(policy), seats: &surface.seats }
+        let quats = sums.into_iter().map(|(sum, _)| unit(sum, CANCELLED * largest)).collect();
+        Self { quats, combine: Combine::Sum(policy), embeddings: &surface.embeddings }
     }
 
-    /// The turns of a block.
+    /// R of each lane.
     #[inline(never)]
     pub(super) fn of_block(&self, input: &BlockInput<'_>) -> [Lanes; 4] {
-        let mut turns = splat(rotation::identity());
+        let mut relative = identity();
         for lane in 0..LANES {
-            let turn = self.combined(input.gaussian(lane));
-            put(&mut turns, lane, turn.unwrap_or_else(|| input.average_of(lane)));
+            let quat = self.combined(input.gaussian(lane));
+            put(&mut relative, lane, quat.unwrap_or_else(|| input.average_of(lane)));
         }
-        turns
+        relative
     }
 
     fn combined(&self, gaussian: usize) -> Option<Quaternion<f32>> {
-        let seat = &self.seats[gaussian];
-        let weights = seat.weights();
-        let [a, b, c] = seat.corners.map(|vertex| self.turns[vertex as usize]);
-        let turns = [a?, b?, c?];
+        let embedding = &self.embeddings[gaussian];
+        let weights = embedding.weights();
+        let [a, b, c] = embedding.corners.map(|vertex| self.quats[vertex as usize]);
+        let quats = [a?, b?, c?];
         match self.combine {
             Combine::Average(solver) => {
                 let average =
-                    average_rotation(&turns.map(|q| q.map(f64::from)), &weights.map(f64::from), solver)?;
+                    average_rotation(&quats.map(|q| q.map(f64::from)), &weights.map(f64::from), solver)?;
                 Some(average.map(|c| c as f32))
             }
             Combine::Sum(policy) => {
                 let mut sum = [0.0; 4];
-                for (turn, weight) in turns.iter().zip(weights) {
+                for (quat, weight) in quats.iter().zip(weights) {
                     let aligned = policy == SignPolicy::AlignToFirst;
-                    let signed = if aligned { policy.apply(*turn, turns[0]) } else { *turn };
+                    let signed = if aligned { policy.apply(*quat, quats[0]) } else { *quat };
                     for k in 0..4 {
                         sum[k] += weight * signed[k];
                     }

@@ -1,10 +1,33 @@
 //! The blended matrix B = Σ w_j L_j made a rotation, one Gaussian at a time.
 
-use super::super::LbsProjection;
-use super::super::layout::{LANES, Lanes};
-use super::average::splat;
-use super::{BlockInput, Turn, put, take};
+use super::super::lanes::{LANES, Lanes, identity, put, splat, take};
+use super::{BlockInput, Rotated};
 use skinsplat_core::math::{Quaternion, dot4, matrix3, rotation};
+
+/// How the blend B is made a rotation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LbsProjection {
+    /// Gram-Schmidt over the columns, the first kept in direction.
+    GramSchmidtColumns,
+    /// Gram-Schmidt over the rows, the first kept in direction.
+    GramSchmidtRows,
+    /// PyTorch3D's conversion of B·R_c, *not* normalised, drawn as the 3DGS kernels do: HUGS. Not a rotation.
+    MatrixToQuaternionRaw,
+    /// The same conversion of B·R_c, normalised.
+    MatrixToQuaternion,
+    /// The nearest rotation (SVD with the determinant corrected). On rigid joints this *is* the quaternion average.
+    Polar,
+}
+
+impl LbsProjection {
+    /// True if it projects B R_c, not B.
+    pub(crate) fn converts(self) -> bool {
+        match self {
+            Self::MatrixToQuaternionRaw | Self::MatrixToQuaternion => true,
+            Self::GramSchmidtColumns | Self::GramSchmidtRows | Self::Polar => false,
+        }
+    }
+}
 
 /// The projections that need B alone. A rigid joint alone is its own projection.
 ///
@@ -15,7 +38,7 @@ pub(super) fn projected(projection: LbsProjection, input: &BlockInput<'_>) -> [L
     if let (&[joint], true) = (indices, input.joints.rigid()) {
         return splat(input.joints.rotation[usize::from(joint)]);
     }
-    let mut turn = splat(rotation::identity());
+    let mut relative = identity();
     for lane in 0..LANES {
         let b = input.blend.matrix(lane);
         let projected = match projection {
@@ -29,38 +52,37 @@ pub(super) fn projected(projection: LbsProjection, input: &BlockInput<'_>) -> [L
             Some(matrix) => rotation::matrix_to_quaternion(matrix),
             None => nearest(input, lane),
         };
-        put(&mut turn, lane, quat);
+        put(&mut relative, lane, quat);
     }
-    turn
+    relative
 }
 
 /// PyTorch3D's quaternion of B R_c, raw or normalised: the posed quaternion itself.
 #[inline(never)]
-pub(super) fn converted(projection: LbsProjection, input: &BlockInput<'_>) -> Turn {
-    let identity = splat(rotation::identity());
-    let mut turn = Turn { relative: identity, posed: identity, means: None };
+pub(super) fn converted(projection: LbsProjection, input: &BlockInput<'_>) -> Rotated {
+    let mut rotated = Rotated { relative: identity(), posed: identity(), means: None };
     for lane in 0..LANES {
         let canonical = take(&input.block.rotations, lane);
         let turned =
             matrix3::multiply(input.blend.matrix(lane), rotation::quaternion_to_matrix_raw(canonical));
         let raw = rotation::matrix_to_quaternion_raw(turned);
         let unit = rotation::normalize(raw).unwrap_or(canonical);
-        put(&mut turn.relative, lane, rotation::multiply(unit, rotation::conjugate(canonical)));
+        put(&mut rotated.relative, lane, rotation::multiply(unit, rotation::conjugate(canonical)));
         put(
-            &mut turn.posed,
+            &mut rotated.posed,
             lane,
             if projection == LbsProjection::MatrixToQuaternionRaw { raw } else { unit },
         );
     }
-    turn
+    rotated
 }
 
-/// [`converted`] walked backwards, through B R_c. See [`super::turn_adjoint`].
+/// [`converted`] walked backwards, through B R_c. See [`super::rotation_adjoint`].
 #[inline(never)]
 pub(super) fn converted_adjoint(
     projection: LbsProjection,
     input: &BlockInput<'_>,
-    turn: &Turn,
+    rotated: &Rotated,
     posed: &[Lanes; 4],
     torque: Option<&[Lanes; 3]>,
 ) -> [Lanes; 4] {
@@ -79,9 +101,9 @@ pub(super) fn converted_adjoint(
         let mut of_raw = if raw_is_drawn { of_posed } else { of_length(of_posed) };
         let mut of_canonical = [0.0; 4];
         if let Some(torque) = torque {
-            // R = unit ⊗ R_c⁻¹: turning R_c on turns R back, seen from where R starts.
+            // R = unit ⊗ R_c⁻¹: rotating R_c on rotates R back, seen from where R starts.
             let torque = [0, 1, 2].map(|axis: usize| torque[axis][lane]);
-            let relative = rotation::conjugate(take(&turn.relative, lane));
+            let relative = rotation::conjugate(take(&rotated.relative, lane));
             let back = matrix3::apply(rotation::quaternion_to_matrix_raw(relative), torque).map(|t| -t);
             of_raw = sum(of_raw, of_length(rotation::adjoint::from_torque(unit, torque)));
             of_canonical = rotation::adjoint::from_torque(canonical, back);

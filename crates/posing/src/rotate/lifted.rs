@@ -4,10 +4,9 @@
 //!
 //! [`JointLift`]: super::super::JointLift
 
-use super::super::layout::{LANES, Lanes};
-use super::average::splat;
-use super::{BlockInput, put};
-use skinsplat_core::math::{Quaternion, dot4, rotation};
+use super::super::lanes::{LANES, Lanes, identity, put, splat};
+use super::BlockInput;
+use skinsplat_core::math::{Quaternion, dot4};
 
 /// A sum shorter than this share of the total weight has no direction: joints of equal weight exactly 360° apart on
 /// their way. The quaternion average takes its place.
@@ -30,7 +29,7 @@ pub(super) fn summed(joints: &[Quaternion<f64>], input: &BlockInput<'_>) -> [Lan
             (0..4).for_each(|k| sum[k][lane] += weight * q[k]);
         }
     }
-    let mut turn = splat(rotation::identity());
+    let mut relative = identity();
     for lane in 0..LANES {
         let q = [sum[0][lane], sum[1][lane], sum[2][lane], sum[3][lane]];
         let length = dot4(q, q).sqrt();
@@ -39,7 +38,7 @@ pub(super) fn summed(joints: &[Quaternion<f64>], input: &BlockInput<'_>) -> [Lan
         } else {
             input.average_of(lane)
         };
-        put(&mut turn, lane, unit);
+        put(&mut relative, lane, unit);
     }
-    turn
+    relative
 }

@@ -1,210 +1,291 @@
-//! The rotation axis: one function per choice, a block at a time.
+//! The rotation axis: every choice in one list, and what each is read from in a pose.
+//!
+//! A further choice is a variant, a row and an arm of [`Source::new`] here (the compiler asks for all three), and one
+//! function in a file of its own: from [`BlockInput`] to R of eight Gaussians.
 
 mod average;
+mod block;
 mod dual;
 mod faces;
 mod lbs;
 mod lifted;
 
-pub(super) use faces::{FaceTurns, VertexTurns};
+pub(crate) use block::{BlockInput, Rotated, means_adjoint, rotate, rotation_adjoint};
+pub use lbs::LbsProjection;
 
-use super::blend::Blend;
+use super::face_frame::FaceFrame;
 use super::joints::Joints;
-use super::layout::{Block, Chunk, LANES, Lanes};
-use super::{JointLift, LbsProjection, RotationChoice};
-use average::splat;
+use super::lanes::Lanes;
+use super::surface::Surface;
+use super::{JointLift, PosingError};
+use faces::{FaceRotations, VertexRotations};
+use skinsplat_core::math::Quaternion;
 use skinsplat_core::math::average::Solver;
-use skinsplat_core::math::{Quaternion, rotation};
+use skinsplat_core::math::rotation::SignPolicy;
+use skinsplat_core::scene::PosedBody;
 use std::borrow::Cow;
+use std::fmt;
+use std::str::FromStr;
 
-/// How the Gaussians of a block turn.
-pub(super) struct Turn {
-    /// R relative to the rest pose, as unit quaternions.
-    pub(super) relative: [Lanes; 4],
-    /// The quaternions that are drawn: R ⊗ R_c, of unit length except for [`LbsProjection::MatrixToQuaternionRaw`].
-    pub(super) posed: [Lanes; 4],
-    /// The posed means, where the rotation comes with a motion of its own.
-    pub(super) means: Option<[Lanes; 3]>,
+/// Where the rotation R of a Gaussian relative to its canonical orientation comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
+pub enum RotationChoice {
+    /// The LBS matrix, made a rotation.
+    Lbs(LbsProjection),
+    /// The frame of the face that the Gaussian sits on (or is nearest to in the rest pose).
+    FaceFrame(FaceFrame),
+    /// Eq. 7: the average of the joints' rotations with the skinning weights.
+    QuaternionAverage(Solver),
+    /// Eq. 7 per vertex, then again over the three vertices of the face with barycentric weights (paper §4.2, §4.3).
+    VertexAverage(Solver),
+    /// SplattingAvatar: face rotations summed at vertices (rest areas), vertex quaternions summed barycentrically.
+    VertexQuaternions(SignPolicy),
+    /// The normalised sum of the joints' quaternions with signs that belong together ([`JointLift`]): as the average for
+    /// nearby joints, and continuous where that jumps.
+    LiftedSum,
+    /// Dual-quaternion blending; the mean of a Gaussian with weights of its own follows it too.
+    DualQuaternion,
 }
 
-/// What the rotation of a pose is read from, besides the blend.
-pub(super) enum Source<'a> {
-    /// Nothing: no Gaussian moves, or nobody asks how it turns.
+/// A rotation choice with an id of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NamedRotation {
+    /// Stable id.
+    pub id: &'static str,
+    /// What it is, in a line.
+    pub summary: &'static str,
+    /// The choice.
+    pub choice: RotationChoice,
+}
+
+/// [`RotationChoice::NAMED`] and the ids, from one list. A choice that is not in it does not compile.
+macro_rules! named_rotations {
+    ($(($id:literal, $summary:literal, $($choice:tt)+)),+ $(,)?) => {
+        impl RotationChoice {
+            /// The choices whose id takes no parameter. The ids of [`Solver`] stand for
+            /// [`RotationChoice::QuaternionAverage`], and `vertex-average-` may be followed by one.
+            pub const NAMED: [NamedRotation; [$($id),+].len()] =
+                [$(NamedRotation { id: $id, summary: $summary, choice: Self::$($choice)+ }),+];
+        }
+
+        impl fmt::Display for RotationChoice {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                match self {
+                    $(Self::$($choice)+ => f.write_str($id),)+
+                    Self::QuaternionAverage(solver) => write!(f, "{solver}"),
+                    Self::VertexAverage(solver) => write!(f, "{VERTEX_AVERAGE}{solver}"),
+                }
+            }
+        }
+    };
+}
+
+named_rotations![
+    (
+        "gram-schmidt-columns",
+        "Gram-Schmidt over the columns of the blended matrix",
+        Lbs(LbsProjection::GramSchmidtColumns)
+    ),
+    (
+        "gram-schmidt-rows",
+        "Gram-Schmidt over the rows of the blended matrix",
+        Lbs(LbsProjection::GramSchmidtRows)
+    ),
+    (
+        "matrix-to-quaternion-raw",
+        "PyTorch3D's quaternion of B R_c, not normalised: HUGS",
+        Lbs(LbsProjection::MatrixToQuaternionRaw)
+    ),
+    (
+        "matrix-to-quaternion",
+        "PyTorch3D's quaternion of B R_c, normalised",
+        Lbs(LbsProjection::MatrixToQuaternion)
+    ),
+    (
+        "lbs-polar",
+        "the rotation nearest to the blended matrix (the quaternion average, by another road)",
+        Lbs(LbsProjection::Polar)
+    ),
+    (
+        "face-splattingavatar",
+        "the tangent frame of the face, along its first edge",
+        FaceFrame(FaceFrame::SplattingAvatar)
+    ),
+    ("face-ihuman", "iHuman's frame of the face: the same rotation", FaceFrame(FaceFrame::IHuman)),
+    ("face-haha", "HAHA's frame of the face, along its second edge", FaceFrame(FaceFrame::Haha)),
+    (
+        "face-haha-scaled",
+        "HAHA's frame; means and scales follow the size of the face too",
+        FaceFrame(FaceFrame::HahaScaled)
+    ),
+    (
+        "vertex-average",
+        "Eq. 7 at the vertices, and again over the face with barycentric weights",
+        VertexAverage(Solver::ClosedForm)
+    ),
+    (
+        "vertex-quaternions-w",
+        "face rotations summed at vertices and over the face, w at least 0: SplattingAvatar",
+        VertexQuaternions(SignPolicy::NonNegativeW)
+    ),
+    (
+        "vertex-quaternions-largest",
+        "the same, the largest component positive",
+        VertexQuaternions(SignPolicy::LargestPositive)
+    ),
+    (
+        "vertex-quaternions-align",
+        "the same, signs aligned to the first",
+        VertexQuaternions(SignPolicy::AlignToFirst)
+    ),
+    ("lifted-sum", "joint quaternions summed with signs that belong together: no jump at 180°", LiftedSum),
+    ("dual-quaternion", "dual-quaternion blending, of the mean too", DualQuaternion),
+];
+
+/// What goes before the id of a solver.
+const VERTEX_AVERAGE: &str = "vertex-average-";
+
+impl RotationChoice {
+    /// The choices of [`Self::NAMED`].
+    pub fn named() -> impl Iterator<Item = Self> + Clone {
+        Self::NAMED.into_iter().map(|named| named.choice)
+    }
+
+    /// True if R is read from the posed mesh or from the face of the Gaussian.
+    pub fn needs_faces(self) -> bool {
+        match self {
+            Self::FaceFrame(_) | Self::VertexAverage(_) | Self::VertexQuaternions(_) => true,
+            Self::Lbs(_) | Self::QuaternionAverage(_) | Self::LiftedSum | Self::DualQuaternion => false,
+        }
+    }
+
+    /// True if the mean of a Gaussian with weights of its own follows R, not Eq. 6.
+    pub(crate) fn moves_means(self) -> bool {
+        match self {
+            Self::DualQuaternion | Self::FaceFrame(FaceFrame::HahaScaled) => true,
+            Self::Lbs(_)
+            | Self::FaceFrame(_)
+            | Self::QuaternionAverage(_)
+            | Self::VertexAverage(_)
+            | Self::VertexQuaternions(_)
+            | Self::LiftedSum => false,
+        }
+    }
+}
+
+impl FromStr for RotationChoice {
+    type Err = PosingError;
+
+    fn from_str(id: &str) -> Result<Self, PosingError> {
+        if let Some(named) = Self::NAMED.iter().find(|named| named.id == id) {
+            return Ok(named.choice);
+        }
+        let unknown = |_| {
+            let forms = Solver::FORMS.map(|(form, _)| form).join(", ");
+            let named = Self::NAMED.map(|named| named.id).join(", ");
+            let expected = format!("{forms}, {VERTEX_AVERAGE}SOLVER, {named}");
+            PosingError::UnknownId { axis: "rotation", id: id.to_owned(), expected }
+        };
+        match id.strip_prefix(VERTEX_AVERAGE) {
+            Some(solver) => solver.parse().map(Self::VertexAverage).map_err(unknown),
+            None => id.parse().map(Self::QuaternionAverage).map_err(unknown),
+        }
+    }
+}
+
+impl TryFrom<String> for RotationChoice {
+    type Error = PosingError;
+
+    fn try_from(id: String) -> Result<Self, PosingError> {
+        id.parse()
+    }
+}
+
+impl From<RotationChoice> for String {
+    fn from(choice: RotationChoice) -> Self {
+        choice.to_string()
+    }
+}
+
+/// What R is read from in one pose, besides the blend.
+pub(crate) enum Source<'a> {
+    /// Nothing: no Gaussian moves, or nobody asks how it is rotated.
     Identity,
     /// The blended matrix.
     Lbs(LbsProjection),
     /// The joints' rotations.
     Average(Solver),
-    /// The joints' rotations with signs.
-    Lifted(Cow<'a, JointLift>),
     /// The joints' rigid motions.
     Dual,
     /// One rotation per face.
-    Faces(FaceTurns<'a>),
-    /// One rotation per vertex, combined over a face.
-    Vertices(VertexTurns<'a>),
+    Faces(FaceRotations<'a>),
+    /// Anything else: R of each lane, as unit quaternions.
+    PerBlock(Box<dyn Fn(&BlockInput<'_>) -> [Lanes; 4] + Sync + 'a>),
 }
 
 impl<'a> Source<'a> {
     /// Everything that is computed once per pose. An avatar that knows no faces must be one that does not move.
-    pub(super) fn new(
+    pub(crate) fn new(
         choice: RotationChoice,
         joints: &Joints,
-        body: &skinsplat_core::scene::PosedBody<'_>,
-        surface: Option<&'a super::seat::Surface>,
+        body: &PosedBody<'_>,
+        surface: Option<&'a Surface>,
         lift: Option<&'a JointLift>,
     ) -> Self {
-        match (choice, surface) {
-            (RotationChoice::Lbs(projection), _) => Self::Lbs(projection),
-            (RotationChoice::QuaternionAverage(solver), _) => Self::Average(solver),
-            (RotationChoice::LiftedSum, _) => {
-                Self::Lifted(lift.map_or_else(|| Cow::Owned(JointLift::from_rest(body)), Cow::Borrowed))
+        let on = |made: &dyn Fn(&'a Surface) -> Self| surface.map_or(Self::Identity, made);
+        match choice {
+            RotationChoice::Lbs(projection) => Self::Lbs(projection),
+            RotationChoice::QuaternionAverage(solver) => Self::Average(solver),
+            RotationChoice::DualQuaternion => Self::Dual,
+            RotationChoice::FaceFrame(kind) => {
+                on(&|surface| Self::Faces(FaceRotations::new(kind, body, surface)))
             }
-            (RotationChoice::DualQuaternion, _) => Self::Dual,
-            (RotationChoice::FaceFrame(kind), Some(surface)) => {
-                Self::Faces(FaceTurns::new(kind, body, surface))
+            RotationChoice::VertexAverage(solver) => on(&|surface| {
+                let vertices = VertexRotations::averaged(solver, joints, body, surface);
+                Self::per_block(move |input| vertices.of_block(input))
+            }),
+            RotationChoice::VertexQuaternions(policy) => on(&|surface| {
+                let vertices = VertexRotations::summed(policy, body, surface);
+                Self::per_block(move |input| vertices.of_block(input))
+            }),
+            RotationChoice::LiftedSum => {
+                let lift = lift.map_or_else(|| Cow::Owned(JointLift::from_rest(body)), Cow::Borrowed);
+                Self::per_block(move |input| lifted::summed(lift.quaternions(), input))
             }
-            (RotationChoice::VertexAverage(solver), Some(surface)) => {
-                Self::Vertices(VertexTurns::averaged(solver, joints, body, surface))
-            }
-            (RotationChoice::VertexQuaternions(policy), Some(surface)) => {
-                Self::Vertices(VertexTurns::summed(policy, body, surface))
-            }
-            (
-                RotationChoice::FaceFrame(_)
-                | RotationChoice::VertexAverage(_)
-                | RotationChoice::VertexQuaternions(_),
-                None,
-            ) => Self::Identity,
         }
     }
-}
 
-/// What a block is turned with.
-pub(super) struct BlockInput<'a> {
-    pub(super) joints: &'a Joints,
-    pub(super) chunk: &'a Chunk,
-    pub(super) block: &'a Block,
-    /// Index of the chunk's first Gaussian.
-    pub(super) start: usize,
-    pub(super) blend: &'a Blend,
-}
-
-impl BlockInput<'_> {
-    /// The quaternion average of one lane: what degenerate cases fall back on.
-    pub(super) fn average_of(&self, lane: usize) -> Quaternion<f32> {
-        let (indices, weights) = self.chunk.influences(self.block);
-        average::of_lane(self.joints, indices, weights, lane, Solver::ClosedForm)
+    /// Rotations that somebody else has computed, one per Gaussian.
+    pub(crate) fn given(rotations: &'a [Quaternion<f32>]) -> Self {
+        Self::per_block(move |input| input.gather(rotations))
     }
 
-    /// Index of a lane's Gaussian.
-    pub(super) fn gaussian(&self, lane: usize) -> usize {
-        self.start + usize::from(self.block.index[lane])
+    fn per_block(rotations: impl Fn(&BlockInput<'_>) -> [Lanes; 4] + Sync + 'a) -> Self {
+        Self::PerBlock(Box::new(rotations))
     }
-}
 
-/// Turns a block.
-#[inline(always)]
-pub(super) fn turn(arch: pulp::Arch, source: &Source<'_>, input: &BlockInput<'_>) -> Turn {
-    let (indices, weights) = input.chunk.influences(input.block);
-    if indices.is_empty() {
-        return Turn { relative: splat(rotation::identity()), posed: input.block.rotations, means: None };
+    /// True if the drawn quaternion is read from B R_c, so that R depends on R_c.
+    pub(crate) fn converts(&self) -> bool {
+        matches!(self, Self::Lbs(projection) if projection.converts())
     }
-    let mut means = None;
-    let relative = match source {
-        Source::Lbs(
-            projection @ (LbsProjection::MatrixToQuaternionRaw | LbsProjection::MatrixToQuaternion),
-        ) => {
-            return lbs::converted(*projection, input);
+
+    /// True if the quaternion that is drawn is not of unit length.
+    pub(crate) fn is_raw(&self) -> bool {
+        matches!(self, Self::Lbs(LbsProjection::MatrixToQuaternionRaw))
+    }
+
+    /// True if the mean of a Gaussian with weights of its own follows R, not Eq. 6.
+    pub(crate) fn moves_means(&self) -> bool {
+        matches!(self, Self::Dual) || self.scaled_faces().is_some()
+    }
+
+    /// The rotations of the faces, where means and scales follow the faces' size.
+    pub(crate) fn scaled_faces(&self) -> Option<&FaceRotations<'a>> {
+        match self {
+            Self::Faces(faces) if faces.kind == FaceFrame::HahaScaled => Some(faces),
+            _ => None,
         }
-        Source::Identity => splat(rotation::identity()),
-        Source::Lbs(projection) => lbs::projected(*projection, input),
-        Source::Average(solver) => {
-            average::average(arch, input.joints, indices, weights, input.blend, *solver)
-        }
-        Source::Lifted(lift) => lifted::summed(lift.quaternions(), input),
-        Source::Dual => {
-            let motions = dual::blend(input.joints, indices, weights);
-            means = Some(motions.transform(&input.block.means));
-            motions.real
-        }
-        Source::Faces(turns) => turns.of_block(input),
-        Source::Vertices(turns) => turns.of_block(input),
-    };
-    let posed = multiply(&relative, &input.block.rotations);
-    Turn { relative, posed, means }
-}
-
-/// The derivatives with respect to the canonical quaternions (to first order on the unit sphere) from those with respect
-/// to [`Turn::posed`]. `torque`, with respect to a further rotation of [`Turn::relative`], is read only where R depends
-/// on R_c.
-#[inline(always)]
-pub(super) fn turn_adjoint(
-    source: &Source<'_>,
-    input: &BlockInput<'_>,
-    turn: &Turn,
-    posed: &[Lanes; 4],
-    torque: Option<&[Lanes; 3]>,
-) -> [Lanes; 4] {
-    match source {
-        Source::Lbs(projection) if projection.converts() && !input.block.influences.is_empty() => {
-            lbs::converted_adjoint(*projection, input, turn, posed, torque)
-        }
-        _ => {
-            let mut canonical = [[0.0; LANES]; 4];
-            for lane in 0..LANES {
-                let back = rotation::conjugate(take(&turn.relative, lane));
-                put(&mut canonical, lane, rotation::multiply(back, take(posed, lane)));
-            }
-            canonical
-        }
-    }
-}
-
-/// The derivatives with respect to the canonical means where [`Turn::means`] takes the place of Eq. 6: Rᵀ g.
-#[inline(always)]
-pub(super) fn means_adjoint(turn: &Turn, gradient: &[Lanes; 3]) -> [Lanes; 3] {
-    let mut means = [[0.0; LANES]; 3];
-    for lane in 0..LANES {
-        let back = rotation::quaternion_to_matrix_raw(rotation::conjugate(take(&turn.relative, lane)));
-        for axis in 0..3 {
-            means[axis][lane] = back[axis][0] * gradient[0][lane]
-                + back[axis][1] * gradient[1][lane]
-                + back[axis][2] * gradient[2][lane];
-        }
-    }
-    means
-}
-
-/// a ⊗ b per lane.
-#[inline(always)]
-fn multiply(a: &[Lanes; 4], b: &[Lanes; 4]) -> [Lanes; 4] {
-    let mut product = [[0.0; LANES]; 4];
-    for lane in 0..LANES {
-        put(&mut product, lane, rotation::multiply(take(a, lane), take(b, lane)));
-    }
-    product
-}
-
-/// a + b per lane.
-pub(super) fn sum(a: &[Lanes; 4], b: &[Lanes; 4]) -> [Lanes; 4] {
-    let mut sum = *a;
-    for (sum, b) in sum.as_flattened_mut().iter_mut().zip(b.as_flattened()) {
-        *sum += b;
-    }
-    sum
-}
-
-/// One lane.
-#[inline(always)]
-pub(super) fn take(quats: &[Lanes; 4], lane: usize) -> Quaternion<f32> {
-    [quats[0][lane], quats[1][lane], quats[2][lane], quats[3][lane]]
-}
-
-/// Sets one lane.
-#[inline(always)]
-pub(super) fn put(quats: &mut [Lanes; 4], lane: usize, q: Quaternion<f32>) {
-    for k in 0..4 {
-        quats[k][lane] = q[k];
     }
 }

@@ -4,12 +4,11 @@ use super::Cutoffs;
 use crate::splat::RenderSettings;
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
+use skinsplat_core::scene::rasterizer::{self, DEVIATIONS, LEAST_DISCRIMINANT, LOW_PASS};
 use skinsplat_core::scene::{Camera, ColourClamp, Posed};
 
-/// Side of a tile, pixels.
-pub(super) const TILE: usize = 16;
-/// Variance added to both screen axes, pixels².
-const LOW_PASS: f64 = 0.3;
+pub(super) use rasterizer::TILE;
+
 /// Alpha is capped here.
 const MAX_ALPHA: f64 = 0.99;
 
@@ -152,8 +151,8 @@ impl Footprint {
     fn radius(&self) -> f64 {
         let variances = self.variances();
         let middle = 0.5 * (variances.x + variances.y);
-        let largest = middle + (middle * middle - self.determinant).max(0.1).sqrt();
-        (3.0 * largest.sqrt()).ceil()
+        let largest = middle + (middle * middle - self.determinant).max(LEAST_DISCRIMINANT).sqrt();
+        (DEVIATIONS * largest.sqrt()).ceil()
     }
 
     /// Of the opacity, for what the low-pass adds.
@@ -176,7 +175,7 @@ fn tiles_touched(mean: DVec2, radius: f64) -> (DVec2, DVec2) {
 }
 
 fn colour(posed: &Posed, i: usize, direction: DVec3) -> DVec3 {
-    let direction = match &posed.view_frames {
+    let direction = match posed.view_frames {
         Some(frames) => frames[i].as_dmat3() * direction,
         None => direction,
     };

@@ -99,7 +99,7 @@ mod tests {
     use glam::Vec3;
     use skinsplat_core::math::random::SplitMix64;
     use skinsplat_core::math::sh;
-    use skinsplat_core::scene::Gaussians;
+    use skinsplat_core::scene::{Gaussians, OwnedPosed};
 
     /// Two hundred random splats in front of a camera.
     fn scene() -> (Gaussians, Camera) {
@@ -129,11 +129,11 @@ mod tests {
     #[test]
     fn with_the_stock_cutoffs_it_is_the_rasterizer() {
         let (gaussians, camera) = scene();
-        let posed = Posed::from_static(&gaussians);
+        let posed = OwnedPosed::from_static(&gaussians);
         for antialiased in [false, true] {
             let settings = RenderSettings { background: [0.2, 0.3, 0.4], antialiased };
-            let fast = render(&posed, &camera, &settings).image;
-            let plain = draw(&posed, &camera, &settings, Cutoffs::STOCK).image;
+            let fast = render(&posed.as_posed(), &camera, &settings).image;
+            let plain = draw(&posed.as_posed(), &camera, &settings, Cutoffs::STOCK).image;
             let psnr = psnr(&fast, &plain);
             // A pixel whose alpha is within rounding of a cut-off may fall on either side.
             assert!(psnr > 75.0, "{psnr} dB");
@@ -143,14 +143,17 @@ mod tests {
     #[test]
     fn every_cutoff_changes_the_image_and_the_exact_image_has_none() {
         let (gaussians, camera) = scene();
-        let posed = Posed::from_static(&gaussians);
-        let exact = draw(&posed, &camera, &GREY, Cutoffs::NONE);
-        let with = |cutoffs| psnr(&draw(&posed, &camera, &GREY, cutoffs).image, &exact.image);
+        let posed = OwnedPosed::from_static(&gaussians);
+        let exact = draw(&posed.as_posed(), &camera, &GREY, Cutoffs::NONE);
+        let with = |cutoffs| psnr(&draw(&posed.as_posed(), &camera, &GREY, cutoffs).image, &exact.image);
         let alpha = with(Cutoffs { alpha: 1.0 / 255.0, ..Cutoffs::NONE });
         assert!(alpha.is_finite() && with(Cutoffs { alpha: 0.05, ..Cutoffs::NONE }) < alpha);
         assert!(with(Cutoffs { three_sigma: true, ..Cutoffs::NONE }).is_finite());
         let antialiased = RenderSettings { antialiased: true, ..GREY };
-        assert!(psnr(&draw(&posed, &camera, &antialiased, Cutoffs::NONE).image, &exact.image).is_finite());
+        assert!(
+            psnr(&draw(&posed.as_posed(), &camera, &antialiased, Cutoffs::NONE).image, &exact.image)
+                .is_finite()
+        );
         assert_eq!(with(Cutoffs { transmittance: 1e-300, ..Cutoffs::NONE }), f64::INFINITY);
         assert!(with(Cutoffs { transmittance: 0.5, ..Cutoffs::NONE }) < 50.0);
     }
@@ -163,7 +166,7 @@ mod tests {
         // Colour 1: the image is the alpha.
         gaussians.sh = vec![[(0.5 / sh::C0) as f32; 3]; gaussians.len()];
         let drawn = draw(
-            &Posed::from_static(&gaussians),
+            &OwnedPosed::from_static(&gaussians).as_posed(),
             &camera,
             &RenderSettings { background: [0.0; 3], ..GREY },
             Cutoffs::NONE,

@@ -6,16 +6,13 @@
 use super::lanes::Lanes;
 use super::wide::{Wide, each};
 use glam::DMat4;
-use skinsplat_core::scene::Camera;
+use skinsplat_core::scene::{Camera, rasterizer};
 
-/// Side of the tiles that bound a splat's reach, pixels.
-pub(super) const TILE: usize = 16;
-/// Gaussians at or in front of this view depth are not drawn.
-const NEAR: f32 = 0.2;
-/// The projection is linearised no further out than this multiple of the half field of view.
-const JACOBIAN_LIMIT: f32 = 1.3;
-/// Variance added to both screen axes, pixels².
-pub(super) const LOW_PASS: f32 = 0.3;
+pub(super) use rasterizer::TILE;
+
+const NEAR: f32 = rasterizer::NEAR as f32;
+const JACOBIAN_LIMIT: f32 = rasterizer::JACOBIAN_LIMIT as f32;
+pub(super) const LOW_PASS: f32 = rasterizer::LOW_PASS as f32;
 /// Least ratio of determinants before and after the low-pass that the antialiasing factor may take the root of.
 pub(super) const LEAST_COMPENSATION: f32 = 0.000_025;
 /// Pixels by which culling bounds are widened: more than the rounding of any position in the image.
@@ -158,8 +155,9 @@ pub(super) fn project<L: Lanes>(
     let conic = [yy * inverse, -(xy * inverse), xx * inverse];
 
     let middle = number(0.5) * (xx + yy);
-    let largest = middle + (middle * middle - determinant).max(number(0.1)).sqrt();
-    let radius = (number(3.0) * largest.sqrt()).ceil();
+    let largest =
+        middle + (middle * middle - determinant).max(number(rasterizer::LEAST_DISCRIMINANT as f32)).sqrt();
+    let radius = (number(rasterizer::DEVIATIONS as f32) * largest.sqrt()).ceil();
     let mean = [pixel_position(view, 0, mean, z), pixel_position(view, 1, mean, z)];
 
     let ratio = ((bare_xx * bare_yy - xy * xy) * inverse).max(number(LEAST_COMPENSATION));

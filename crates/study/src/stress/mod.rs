@@ -22,7 +22,7 @@ pub mod table;
 
 pub use report::{Picture, Report};
 
-use skinsplat_posing::StrategyError;
+use skinsplat_posing::PosingError;
 use table::Findings;
 
 /// A part of the examination.
@@ -72,7 +72,7 @@ impl Section {
     ///
     /// # Errors
     /// None that the built-in body does not cause.
-    pub fn examine(self, quick: bool) -> Result<Examined, StrategyError> {
+    pub fn examine(self, quick: bool) -> Result<Examined, PosingError> {
         let pictures = if self == Self::Sequences { pictures::draw(quick)? } else { Vec::new() };
         let findings = match self {
             Self::Averages => averages::run(quick),

@@ -4,7 +4,7 @@ use super::report::Picture;
 use super::stage;
 use glam::DVec3;
 use skinsplat_core::scene::{Camera, Image, PosedBody, RestBody};
-use skinsplat_posing::{BoundAvatar, JointLift, PoseBuffers, RotationChoice, StrategyError, pose_lifted};
+use skinsplat_posing::{BoundAvatar, JointLift, PoseOptions, Poser, PosingError, RotationChoice};
 use skinsplat_render::splat::{RenderSettings, render};
 
 /// Degrees of the joint in the four panels.
@@ -32,7 +32,7 @@ const VISIBLE: f32 = 4.0 / 255.0;
 ///
 /// # Errors
 /// None that the built-in body does not cause.
-pub(super) fn draw(quick: bool) -> Result<Vec<Picture>, StrategyError> {
+pub(super) fn draw(quick: bool) -> Result<Vec<Picture>, PosingError> {
     let body = stage::body()?;
     let bound = BoundAvatar::new(&stage::surface(&body), &body)?;
     let mut pictures = Vec::new();
@@ -60,7 +60,7 @@ fn strip(
     bound: &BoundAvatar,
     rotation: RotationChoice,
     axis: DVec3,
-) -> Result<Image, StrategyError> {
+) -> Result<Image, PosingError> {
     let target = stage::moving_joint(body);
     let camera = Camera::look_at(
         target + DVec3::new(0.0, 0.25, 0.6),
@@ -73,15 +73,15 @@ fn strip(
     let settings = RenderSettings { background: [1.0; 3], antialiased: false };
     let strategy = stage::plain(rotation);
     let mut strip = Image::filled(SIDE * ANGLES.len(), SIDE, [1.0; 3]);
-    let mut lift: Option<JointLift> = None;
+    let (mut poser, mut lift) = (Poser::new(), None::<JointLift>);
     for (panel, degrees) in ANGLES.into_iter().enumerate() {
         let angle = axis * degrees.to_radians();
         let at = stage::bent(body, &[DVec3::ZERO, angle, DVec3::ZERO, DVec3::ZERO]);
         let posed_body = PosedBody::new(body, &at)?;
         let next = JointLift::next(lift.as_ref(), &posed_body);
-        let posed = pose_lifted(bound, &posed_body, &strategy, &next, &mut PoseBuffers::default())?;
+        let options = PoseOptions { lift: Some(&next), ..PoseOptions::default() };
+        let rendered = render(&poser.pose(bound, &posed_body, &strategy, &options)?, &camera, &settings);
         lift = Some(next);
-        let rendered = render(&posed, &camera, &settings);
         let width = strip.width();
         for (y, row) in rendered.image.pixels().chunks(SIDE).enumerate() {
             strip.pixels_mut()[y * width + panel * SIDE..][..SIDE].copy_from_slice(row);

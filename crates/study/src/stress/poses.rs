@@ -8,8 +8,8 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 use skinsplat_core::math::Quaternion;
 use skinsplat_core::math::rotation::{angle_between, multiply};
-use skinsplat_core::scene::{Pose, Posed, PosedBody, RestBody};
-use skinsplat_posing::{BoundAvatar, Strategy, StrategyError, pose};
+use skinsplat_core::scene::{OwnedPosed, Pose, PosedBody, RestBody};
+use skinsplat_posing::{BoundAvatar, PosingError, Strategy, pose};
 
 const SECTION: &str = "poses";
 
@@ -80,7 +80,7 @@ fn on<T: Send>(pool: Option<&ThreadPool>, work: impl FnOnce() -> T + Send) -> T 
 }
 
 impl Stage<'_> {
-    fn outcome(&self, strategy: &Strategy, at: &Pose) -> Result<Outcome, StrategyError> {
+    fn outcome(&self, strategy: &Strategy, at: &Pose) -> Result<Outcome, PosingError> {
         let body = PosedBody::new(self.body, at)?;
         let here = on(self.one, || pose(self.bound, &body, strategy))?;
         let again = on(self.two, || pose(self.bound, &body, strategy))?;
@@ -120,7 +120,7 @@ fn unit_scale(factor: &Mat3) -> [[f64; 3]; 3] {
     (factor.as_dmat3() * inverse).transpose().to_cols_array_2d()
 }
 
-fn is_finite(posed: &Posed<'_>) -> bool {
+fn is_finite(posed: &OwnedPosed) -> bool {
     posed.means.iter().all(|m| m.is_finite()) && posed.factors.iter().all(|m| m.is_finite())
 }
 
@@ -128,7 +128,7 @@ fn is_finite(posed: &Posed<'_>) -> bool {
 ///
 /// # Errors
 /// None that the built-in body does not cause.
-pub(super) fn run(quick: bool) -> Result<Findings, StrategyError> {
+pub(super) fn run(quick: bool) -> Result<Findings, PosingError> {
     let body = stage::body()?;
     let bound = BoundAvatar::new(&stage::surface(&body), &body)?;
     let mut strategies: Vec<Strategy> = stage::rotations().into_iter().map(stage::plain).collect();
@@ -207,7 +207,7 @@ fn shown_row(row: &Row) -> String {
 }
 
 /// How rotations change when body and all are far from the origin.
-fn shifts(stage: &Stage<'_>, strategies: &[Strategy], findings: &mut Findings) -> Result<(), StrategyError> {
+fn shifts(stage: &Stage<'_>, strategies: &[Strategy], findings: &mut Findings) -> Result<(), PosingError> {
     let at = second(stage.body, DVec3::new(0.9, 0.4, 0.7));
     let home = PosedBody::new(stage.body, &at)?;
     let mut grid = Grid {
@@ -224,7 +224,7 @@ fn shifts(stage: &Stage<'_>, strategies: &[Strategy], findings: &mut Findings) -
         let Some(own) = &here.rotations else { continue };
         let changes: Vec<f64> = bodies
             .par_iter()
-            .map(|body| -> Result<f64, StrategyError> {
+            .map(|body| -> Result<f64, PosingError> {
                 let body = body.as_ref().map_err(Clone::clone)?;
                 let there = pose(stage.bound, body, strategy)?;
                 let rotations = there.rotations.unwrap_or_default();

@@ -22,9 +22,9 @@ struct Measured {
 
 fn measure(scene: &Scene, every_way: bool) -> Measured {
     let settings = RenderSettings { background: [0.2, 0.4, 0.6], antialiased: false };
-    let own = render(&scene.posed, &scene.camera, &settings);
+    let own = render(&scene.posed.as_posed(), &scene.camera, &settings);
     let (posed, camera) = scene.truth.as_ref().map_or((&scene.posed, &scene.camera), |(p, c)| (p, c));
-    let truth = definition::render(posed, camera, &settings);
+    let truth = definition::render(&posed.as_posed(), camera, &settings);
     // What is brighter than white is judged relative to how bright it is.
     let brightest = truth.iter().flat_map(|p| &p[..4]).fold(1.0f64, |m, v| m.max(v.abs()));
     let found = own.image.pixels().iter().zip(own.alpha.values());
@@ -57,11 +57,11 @@ fn same_every_way(scene: &Scene, settings: &RenderSettings, own: &Rendered) -> b
     let by_threads = pools
         .iter()
         .flatten()
-        .all(|pool| pool.install(|| render(&scene.posed, &scene.camera, settings)) == *own);
+        .all(|pool| pool.install(|| render(&scene.posed.as_posed(), &scene.camera, settings)) == *own);
     let by_width = [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512]
         .into_iter()
         .filter_map(Renderer::with_simd_level)
-        .all(|mut renderer| renderer.render(&scene.posed, &scene.camera, settings) == *own);
+        .all(|mut renderer| renderer.render(&scene.posed.as_posed(), &scene.camera, settings) == *own);
     by_threads && by_width
 }
 

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::math::{Quaternion, Real, sh};
 use skinsplat_core::scene::{Avatar, PosedBody, RestBody};
-use skinsplat_posing::{BoundAvatar, ColourChoice, CovarianceChoice, PRESETS, Strategy, StrategyError, pose};
+use skinsplat_posing::{BoundAvatar, ColourChoice, CovarianceChoice, PRESETS, PosingError, Strategy, pose};
 
 const SECTION: &str = "scales";
 
@@ -30,7 +30,7 @@ const FACTORS: [(&str, [f64; 3]); 9] = [
 ///
 /// # Errors
 /// None that the built-in body does not cause.
-pub(super) fn run() -> Result<Findings, StrategyError> {
+pub(super) fn run() -> Result<Findings, PosingError> {
     let body = stage::body()?;
     let mut findings =
         Findings { section: SECTION, title: "Extreme scales and coefficients", ..Findings::default() };
@@ -97,11 +97,11 @@ fn factor_error(
     body: &RestBody,
     covariance: CovarianceChoice,
     factors: [f64; 3],
-) -> Result<f64, StrategyError> {
+) -> Result<f64, PosingError> {
     let strategy = Strategy { covariance, colour: ColourChoice::None, ..PRESETS[0].strategy };
     let at = stage::bent(body, &[DVec3::ZERO, DVec3::new(0.9, 0.4, 0.7), DVec3::ZERO, DVec3::ZERO]);
     let posed_body = PosedBody::new(body, &at)?;
-    let columns = |avatar: &Avatar| -> Result<Vec<[DVec3; 3]>, StrategyError> {
+    let columns = |avatar: &Avatar| -> Result<Vec<[DVec3; 3]>, PosingError> {
         let bound = BoundAvatar::new(avatar, body)?;
         let posed = pose(&bound, &posed_body, &strategy)?;
         Ok(posed.factors.iter().map(|m| [m.x_axis, m.y_axis, m.z_axis].map(|c| c.as_dvec3())).collect())

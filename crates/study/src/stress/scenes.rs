@@ -2,7 +2,7 @@
 
 use glam::{DMat4, DVec3, Mat3, Quat, Vec3};
 use skinsplat_core::math::random::SplitMix64;
-use skinsplat_core::scene::{Camera, Posed};
+use skinsplat_core::scene::{Camera, OwnedPosed};
 
 /// Side of the images, pixels.
 const SIDE: u32 = 64;
@@ -12,10 +12,10 @@ const FOCAL: f64 = 100.0;
 
 /// Something to draw, and what the image should be where that is not the definition's image of the same numbers.
 pub(super) struct Scene {
-    pub(super) posed: Posed<'static>,
+    pub(super) posed: OwnedPosed,
     pub(super) camera: Camera,
     /// The same scene in easier numbers.
-    pub(super) truth: Option<(Posed<'static>, Camera)>,
+    pub(super) truth: Option<(OwnedPosed, Camera)>,
 }
 
 /// Scenes along one axis.
@@ -34,17 +34,8 @@ fn camera() -> Camera {
     Camera { width: SIDE, height: SIDE, fx: FOCAL, fy: FOCAL, cx, cy, camera_from_world: DMat4::IDENTITY }
 }
 
-fn gaussians(means: Vec<Vec3>, factors: Vec<Mat3>, opacities: Vec<f32>, sh: Vec<[f32; 3]>) -> Posed<'static> {
-    Posed {
-        means,
-        factors,
-        opacities: opacities.into(),
-        sh_degree: 0,
-        sh: sh.into(),
-        view_frames: None,
-        colour_clamp: Default::default(),
-        rotations: None,
-    }
+fn gaussians(means: Vec<Vec3>, factors: Vec<Mat3>, opacities: Vec<f32>, sh: Vec<[f32; 3]>) -> OwnedPosed {
+    OwnedPosed { means, factors, opacities, sh, ..OwnedPosed::default() }
 }
 
 fn single(mean: Vec3, factor: Mat3, opacity: f32) -> Scene {
@@ -53,7 +44,7 @@ fn single(mean: Vec3, factor: Mat3, opacity: f32) -> Scene {
 }
 
 /// Two hundred Gaussians about the origin, `spread` metres across.
-fn cloud(centre: DVec3) -> Posed<'static> {
+fn cloud(centre: DVec3) -> OwnedPosed {
     let mut random = SplitMix64::new(3);
     let n = 200;
     let mut number = |low: f32, high: f32| low + (high - low) * random.unit_f32();
@@ -138,7 +129,7 @@ fn loud(coefficient: f64) -> Scene {
     let value = |i: usize| {
         [coefficient as f32, -0.5 * coefficient as f32, 0.25 * coefficient as f32].map(|v| v * sign(i))
     };
-    scene.posed.sh = (0..16).map(value).collect::<Vec<_>>().into();
+    scene.posed.sh = (0..16).map(value).collect();
     scene
 }
 

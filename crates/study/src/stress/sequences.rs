@@ -8,9 +8,7 @@ use rayon::prelude::*;
 use skinsplat_core::math::rotation::{angle_between, polar};
 use skinsplat_core::math::{Quaternion, dot4};
 use skinsplat_core::scene::{Pose, PosedBody, RestBody};
-use skinsplat_posing::{
-    BoundAvatar, JointLift, PoseBuffers, RotationChoice, Strategy, StrategyError, pose_lifted,
-};
+use skinsplat_posing::{BoundAvatar, JointLift, PoseOptions, Poser, PosingError, RotationChoice, Strategy};
 
 const SECTION: &str = "sequences";
 
@@ -110,13 +108,14 @@ impl Stage<'_> {
         stage::bent(self.body, &(self.sequence.angles)(t))
     }
 
-    fn at(&self, t: f64, before: Option<&Moment>) -> Result<Moment, StrategyError> {
+    fn at(&self, t: f64, before: Option<&Moment>) -> Result<Moment, PosingError> {
         let body = PosedBody::new(self.body, &self.pose_at(t))?;
         let before = before.filter(|_| self.subject.follows);
         let lift = JointLift::next(before.map(|moment| &moment.lift), &body);
-        let posed =
-            pose_lifted(self.bound, &body, &self.subject.strategy, &lift, &mut PoseBuffers::default())?;
-        let turns = match &posed.rotations {
+        let mut poser = Poser::new();
+        let options = PoseOptions { lift: Some(&lift), ..PoseOptions::default() };
+        let posed = poser.pose(self.bound, &body, &self.subject.strategy, &options)?;
+        let turns = match posed.rotations {
             Some(rotations) => rotations.iter().map(|q| q.map(f64::from)).collect(),
             None => posed.factors.iter().map(|m| turn_of(m.as_dmat3())).collect(),
         };
@@ -131,7 +130,7 @@ impl Stage<'_> {
     }
 
     /// What is left of a change when the step goes to 0.
-    fn left(&self, mut a: Moment, mut b: Moment) -> Result<f64, StrategyError> {
+    fn left(&self, mut a: Moment, mut b: Moment) -> Result<f64, PosingError> {
         for _ in 0..HALVINGS {
             let middle = self.at(0.5 * (a.t + b.t), Some(&a))?;
             b = self.at(b.t, Some(&middle))?;
@@ -155,7 +154,7 @@ struct Course {
     finite: bool,
 }
 
-fn course(stage: &Stage<'_>, frames: usize) -> Result<Course, StrategyError> {
+fn course(stage: &Stage<'_>, frames: usize) -> Result<Course, PosingError> {
     let mut course = Course { jump: 0.0, left: 0.0, probe: PROBES[0].0, deviation: [0.0; 2], finite: true };
     let mut deviations = Vec::new();
     let mut previous = stage.at(0.0, None)?;
@@ -185,7 +184,7 @@ fn course(stage: &Stage<'_>, frames: usize) -> Result<Course, StrategyError> {
     Ok(course)
 }
 
-fn deviate(stage: &Stage<'_>, moment: &Moment, deviations: &mut Vec<f64>) -> Result<(), StrategyError> {
+fn deviate(stage: &Stage<'_>, moment: &Moment, deviations: &mut Vec<f64>) -> Result<(), PosingError> {
     let body = PosedBody::new(stage.body, &stage.pose_at(moment.t))?;
     let lifted = moment.lift.quaternions();
     for ((_, row), &turn) in PROBES.iter().zip(&moment.turns) {
@@ -211,7 +210,7 @@ fn turn_of(m: DMat3) -> Quaternion<f64> {
 ///
 /// # Errors
 /// None that the built-in body does not cause.
-pub(super) fn run(quick: bool) -> Result<Findings, StrategyError> {
+pub(super) fn run(quick: bool) -> Result<Findings, PosingError> {
     let frames = if quick { 90 } else { 720 };
     let body = stage::body()?;
     let bound = BoundAvatar::new(&stage::probes(&body)?, &body)?;
@@ -230,7 +229,7 @@ pub(super) fn run(quick: bool) -> Result<Findings, StrategyError> {
             let stage = Stage { body: &body, bound: &bound, sequence, subject: *subject };
             course(&stage, frames)
         })
-        .collect::<Result<Vec<Course>, StrategyError>>()?;
+        .collect::<Result<Vec<Course>, PosingError>>()?;
     let rows = tasks.iter().zip(&courses).map(|((subject, sequence), course)| row(subject, sequence, course));
     Ok(Findings {
         section: SECTION,

@@ -115,7 +115,7 @@ pub(super) fn rotations() -> Vec<RotationChoice> {
     let solvers = ["closed-form", "eigen", "polar", "power-15", "power-15-ones", "squaring-4", "nlerp"];
     let solvers =
         solvers.iter().filter_map(|id| id.parse::<Solver>().ok()).map(RotationChoice::QuaternionAverage);
-    solvers.chain(RotationChoice::NAMED).collect()
+    solvers.chain(RotationChoice::named()).collect()
 }
 
 /// A rotation choice with covariances rotated and colours left alone.

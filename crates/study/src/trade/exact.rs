@@ -6,9 +6,8 @@ use glam::{Mat3, Quat};
 use rayon::prelude::*;
 use skinsplat_core::math::average::{Solver, average};
 use skinsplat_core::math::{Quaternion, Real, rotation, sh};
-use skinsplat_core::scene::{Camera, Gaussians, Pose, Posed, PosedBody, RestBody, SkinWeights};
+use skinsplat_core::scene::{Camera, Gaussians, OwnedPosed, Pose, PosedBody, RestBody, SkinWeights};
 use skinsplat_posing::{BoundAvatar, ColourChoice, Strategy, pose};
-use std::borrow::Cow;
 use std::sync::Arc;
 
 /// The gap of the eigenvalues below which an average in f64 says more about rounding than about the pose.
@@ -104,12 +103,12 @@ impl Shot {
 
     /// The Gaussians with these rotations in place of the exact ones; SH are turned by them too. A Gaussian without an
     /// answer stays as it is in the rest pose.
-    pub(super) fn dressed<'a>(
+    pub(super) fn dressed(
         &self,
         rig: &Rig,
-        gaussians: &'a Gaussians,
+        gaussians: &Gaussians,
         turns: &[Option<Quaternion<f64>>],
-    ) -> Posed<'a> {
+    ) -> OwnedPosed {
         let count = gaussians.sh_count();
         let turn = |i: usize| turns[i].unwrap_or_else(rotation::identity);
         let factors = (0..self.means.len()).into_par_iter().map(|i| {
@@ -124,12 +123,12 @@ impl Shot {
                 sh::Rotation::from_quaternion(turn, gaussians.sh_degree).apply(own);
             });
         }
-        Posed {
+        OwnedPosed {
             means: self.means.clone(),
             factors: factors.collect(),
-            opacities: Cow::Owned(gaussians.opacities()),
+            opacities: gaussians.opacities(),
             sh_degree: gaussians.sh_degree,
-            sh: Cow::Owned(coefficients),
+            sh: coefficients,
             view_frames: None,
             colour_clamp: skinsplat_core::scene::ColourClamp::NonNegative,
             rotations: None,
@@ -137,7 +136,7 @@ impl Shot {
     }
 
     /// [`Shot::dressed`] with the exact rotations.
-    pub(super) fn exactly<'a>(&self, rig: &Rig, gaussians: &'a Gaussians) -> Posed<'a> {
+    pub(super) fn exactly(&self, rig: &Rig, gaussians: &Gaussians) -> OwnedPosed {
         let exact: Vec<_> = self.exact.iter().map(|exact| Some(exact.quat)).collect();
         self.dressed(rig, gaussians, &exact)
     }

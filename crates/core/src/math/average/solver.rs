@@ -66,6 +66,21 @@ pub enum Solver {
     Nlerp,
 }
 
+impl Solver {
+    /// The forms that ids take, each with what it is in a line.
+    pub const FORMS: [(&'static str, &'static str); 6] = [
+        ("closed-form", "the exact average, fastest: a formula for two bones, certified squaring for more"),
+        ("eigen", "the exact average, by cyclic Jacobi"),
+        ("polar", "the exact average, by the singular value decomposition of the blended matrix"),
+        ("nlerp", "the normalised sum of quaternions on the heaviest bone's side"),
+        (
+            "power-N[-START]",
+            "N power steps from START: heaviest (if none is named), first, ones, identity, nlerp, column",
+        ),
+        ("squaring-N", "2^N power steps without a start, by squaring"),
+    ];
+}
+
 /// The largest number of steps or doublings that an id may ask for.
 const STEP_LIMIT: u32 = 100_000;
 

@@ -8,10 +8,8 @@ use super::{Same, Saving};
 use crate::trade::Error;
 use skinsplat_core::math::rotation::angle_between;
 use skinsplat_core::math::sh;
-use skinsplat_core::scene::{Avatar, Camera, Image, Pose, Posed, PosedBody, RestBody};
-use skinsplat_posing::{
-    BoundAvatar, PoseBuffers, Strategy, StrategyError, pose_into, pose_seen,
-};
+use skinsplat_core::scene::{Avatar, Camera, Image, OwnedPosed, Pose, PosedBody, RestBody};
+use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, PosingError, Strategy, pose};
 use skinsplat_render::splat::{RenderSettings, Renderer};
 use std::hint::black_box;
 
@@ -45,7 +43,7 @@ pub(super) struct Bench<'a> {
     pub(super) cameras: Vec<&'a Camera>,
 }
 
-pub(super) fn strategy(spec: &str) -> Result<Strategy, StrategyError> {
+pub(super) fn strategy(spec: &str) -> Result<Strategy, PosingError> {
     spec.parse()
 }
 
@@ -69,7 +67,7 @@ pub(super) fn identical(largest: f64, same: bool, of: &'static str) -> Same {
 }
 
 /// The largest angle between the drawn rotations, degrees.
-fn turned(a: &Posed<'_>, b: &Posed<'_>) -> f64 {
+fn turned(a: &OwnedPosed, b: &OwnedPosed) -> f64 {
     let pairs = a.rotations.iter().flatten().zip(b.rotations.iter().flatten());
     pairs.map(|(p, q)| angle_between(p.map(f64::from), q.map(f64::from)).to_degrees()).fold(0.0, f64::max)
 }
@@ -97,11 +95,11 @@ impl<'a> Bench<'a> {
     fn posing(
         &self,
         what: String,
-        mut without: impl FnMut(&PosedBody<'_>, &mut PoseBuffers) -> Result<(), StrategyError>,
-        mut with: impl FnMut(&PosedBody<'_>, &mut PoseBuffers) -> Result<(), StrategyError>,
+        mut without: impl FnMut(&PosedBody<'_>, &mut Poser) -> Result<(), PosingError>,
+        mut with: impl FnMut(&PosedBody<'_>, &mut Poser) -> Result<(), PosingError>,
         result: Same,
     ) -> Result<Saving, Error> {
-        let (mut first, mut second) = (PoseBuffers::default(), PoseBuffers::default());
+        let (mut first, mut second) = (Poser::new(), Poser::new());
         let [without, with] = in_turns(
             self.options.runs,
             || self.bodies.iter().try_for_each(|body| without(body, &mut first)),
@@ -111,28 +109,25 @@ impl<'a> Bench<'a> {
         Ok(Saving { what, unit: "pose", without, with, result })
     }
 
-    /// Poses into memory of before, and gives it back.
+    /// Poses into memory of before.
     fn repose(
         &self,
         body: &PosedBody<'_>,
         strategy: &Strategy,
-        buffers: &mut PoseBuffers,
-    ) -> Result<(), StrategyError> {
-        let posed = black_box(pose_into(&self.bound, body, strategy, buffers)?);
-        buffers.reclaim(posed);
-        Ok(())
+        poser: &mut Poser,
+    ) -> Result<(), PosingError> {
+        poser.pose(&self.bound, body, strategy, &PoseOptions::default()).map(|posed| drop(black_box(posed)))
     }
 
     /// Two strategies.
     fn strategies(&self, what: String, without: Strategy, with: Strategy) -> Result<Saving, Error> {
         let mut largest = 0.0f64;
         for body in &self.bodies {
-            let (mut a, mut b) = (PoseBuffers::default(), PoseBuffers::default());
-            let posed = pose_into(&self.bound, body, &without, &mut a)?;
-            largest = largest.max(turned(&posed, &pose_into(&self.bound, body, &with, &mut b)?));
+            let [a, b] = [&without, &with].map(|strategy| pose(&self.bound, body, strategy));
+            largest = largest.max(turned(&a?, &b?));
         }
         let run = |strategy: Strategy| {
-            move |body: &PosedBody<'_>, buffers: &mut PoseBuffers| self.repose(body, &strategy, buffers)
+            move |body: &PosedBody<'_>, poser: &mut Poser| self.repose(body, &strategy, poser)
         };
         self.posing(what, run(without), run(with), compared(largest, SAME_ROTATION, "degrees"))
     }
@@ -149,11 +144,8 @@ impl<'a> Bench<'a> {
         let read = bound.joints_read(&strategy);
         let some = |pose| PosedBody::with_rotations(body, pose, |joint| read[joint]);
         let mut same = true;
-        for (pose, full) in self.poses().zip(&self.bodies) {
-            let (mut a, mut b) = (PoseBuffers::default(), PoseBuffers::default());
-            let part = some(pose)?;
-            same &=
-                pose_into(&bound, full, &strategy, &mut a)? == pose_into(&bound, &part, &strategy, &mut b)?;
+        for (at, full) in self.poses().zip(&self.bodies) {
+            same &= pose(&bound, full, &strategy)? == pose(&bound, &some(at)?, &strategy)?;
         }
         let [without, with] = in_turns(
             self.options.runs,
@@ -283,25 +275,20 @@ struct Way<'a> {
     bound: &'a BoundAvatar,
     strategy: Strategy,
     knows_camera: bool,
-    buffers: PoseBuffers,
+    poser: Poser,
     renderer: Renderer,
 }
 
 impl<'a> Way<'a> {
-    fn new((bound, spec, knows_camera): (&'a BoundAvatar, &str, bool)) -> Result<Self, StrategyError> {
-        let (buffers, renderer) = (PoseBuffers::default(), Renderer::new());
-        Ok(Self { bound, strategy: strategy(spec)?, knows_camera, buffers, renderer })
+    fn new((bound, spec, knows_camera): (&'a BoundAvatar, &str, bool)) -> Result<Self, PosingError> {
+        let (poser, renderer) = (Poser::new(), Renderer::new());
+        Ok(Self { bound, strategy: strategy(spec)?, knows_camera, poser, renderer })
     }
 
-    fn image(&mut self, body: &PosedBody<'_>, camera: &Camera) -> Result<Image, StrategyError> {
-        let Self { bound, strategy, buffers, .. } = self;
-        let posed = if self.knows_camera {
-            pose_seen(bound, body, strategy, camera, buffers)?
-        } else {
-            pose_into(bound, body, strategy, buffers)?
-        };
-        let image = self.renderer.render(&posed, camera, &RenderSettings::default()).image;
-        self.buffers.reclaim(posed);
-        Ok(image)
+    fn image(&mut self, body: &PosedBody<'_>, camera: &Camera) -> Result<Image, PosingError> {
+        let seen_by = self.knows_camera.then_some(camera);
+        let options = PoseOptions { seen_by, ..PoseOptions::default() };
+        let posed = self.poser.pose(self.bound, body, &self.strategy, &options)?;
+        Ok(self.renderer.render(&posed, camera, &RenderSettings::default()).image)
     }
 }

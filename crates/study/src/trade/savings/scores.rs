@@ -26,7 +26,7 @@ impl Scored {
         let background = protocol.background_colour().unwrap_or_default();
         let posed = pose(&bench.bound, &bench.bodies[0], &strategy("quaternion-average")?)?;
         let settings = RenderSettings { background, antialiased: false };
-        let drawn = render(&posed, bench.cameras[0], &settings).image;
+        let drawn = render(&posed.as_posed(), bench.cameras[0], &settings).image;
         Ok(Self { protocol, drawn, truth: bench.scene.test.truth(bench.scene.frames[0])? })
     }
 

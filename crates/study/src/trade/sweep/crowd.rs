@@ -5,10 +5,11 @@ use crate::trade::exact::stock;
 use crate::trade::{Error, Fidelity, Outcome, Sweep, SweepRow, Unit, clock};
 use glam::DVec3;
 use skinsplat_core::math::average::{Solver, Start};
-use skinsplat_core::scene::{Avatar, Camera, Pose, Posed, PosedBody};
-use skinsplat_posing::{BoundAvatar, ColourChoice, RotationChoice, Strategy, StrategyError, pose};
+use skinsplat_core::scene::{Avatar, Camera, OwnedPosed, Pose, PosedBody};
+use skinsplat_posing::{
+    BoundAvatar, ColourChoice, PoseOptions, Poser, PosingError, RotationChoice, Strategy,
+};
 use skinsplat_render::splat::Renderer;
-use std::borrow::Cow;
 
 /// Ways to pose a crowd: name, rotation solver, colour, degree (at most the avatar's own).
 fn choices() -> [(&'static str, Strategy, usize); 6] {
@@ -44,19 +45,21 @@ pub(super) fn avatars(bench: &Bench) -> Result<Sweep, Error> {
                 .collect();
             let bodies: Vec<PosedBody> =
                 poses.iter().map(|at| PosedBody::new(&stage.rig.body, at)).collect::<Result<_, _>>()?;
-            let mut renderer = Renderer::new();
-            let exact = posed(&stage.bound, &bodies, &stock())?;
-            let exact = renderer.render(&exact, camera, &stage.settings).image;
+            let (mut renderer, mut poser) = (Renderer::new(), Poser::new());
+            let exact = posed(&mut poser, &stage.bound, &bodies, &stock())?;
+            let exact = renderer.render(&exact.as_posed(), camera, &stage.settings).image;
             for (name, strategy, degree) in choices() {
                 let bound = if degree == 0 { &flat } else { &stage.bound };
-                let drawn = posed(bound, &bodies, &strategy)?;
-                let mut rendered = renderer.render(&drawn, camera, &stage.settings);
+                let drawn = posed(&mut poser, bound, &bodies, &strategy)?;
+                let mut rendered = renderer.render(&drawn.as_posed(), camera, &stage.settings);
                 let fidelity = Some(Fidelity::between([(&rendered.image, &exact)])?);
                 let repeats = stage.options.repeats;
                 let time = bench.pool.install(|| {
                     clock::time(repeats, || {
-                        posed(bound, &bodies, &strategy)
-                            .map(|all| renderer.render_into(&all, camera, &stage.settings, &mut rendered))
+                        posed(&mut poser, bound, &bodies, &strategy)
+                            .map(|all| {
+                                renderer.render_into(&all.as_posed(), camera, &stage.settings, &mut rendered)
+                            })
                             .is_ok()
                     })
                 });
@@ -101,35 +104,24 @@ fn placed(at: &Pose, camera: &Camera, bench: &Bench, i: usize, count: usize) -> 
 }
 
 /// All avatars of a frame as one set of Gaussians.
-fn posed<'a>(
-    bound: &'a BoundAvatar,
+fn posed(
+    poser: &mut Poser,
+    bound: &BoundAvatar,
     bodies: &[PosedBody<'_>],
     strategy: &Strategy,
-) -> Result<Posed<'a>, StrategyError> {
-    let mut all: Option<Posed<'a>> = None;
-    for body in bodies {
-        let one = pose(bound, body, strategy)?;
-        all = Some(match all {
-            None => one,
-            Some(mut all) => {
-                all.means.extend(one.means);
-                all.factors.extend(one.factors);
-                all.opacities = joined(all.opacities, &one.opacities);
-                all.sh = joined(all.sh, &one.sh);
-                all.view_frames = all.view_frames.zip(one.view_frames).map(|(mut all, one)| {
-                    all.extend(one);
-                    all
-                });
-                all.rotations = None;
-                all
-            }
-        });
+) -> Result<OwnedPosed, PosingError> {
+    let options = PoseOptions::default();
+    let mut all = poser.pose(bound, &bodies[0], strategy, &options)?.into_owned();
+    for body in &bodies[1..] {
+        let one = poser.pose(bound, body, strategy, &options)?;
+        all.means.extend_from_slice(one.means);
+        all.factors.extend_from_slice(one.factors);
+        all.opacities.extend_from_slice(one.opacities);
+        all.sh.extend_from_slice(one.sh);
+        if let (Some(all), Some(one)) = (&mut all.view_frames, one.view_frames) {
+            all.extend_from_slice(one);
+        }
+        all.rotations = None;
     }
-    all.map_or_else(|| pose(bound, &bodies[0], strategy), Ok)
-}
-
-fn joined<'a, T: Clone>(all: Cow<'a, [T]>, more: &[T]) -> Cow<'a, [T]> {
-    let mut all = all.into_owned();
-    all.extend_from_slice(more);
-    Cow::Owned(all)
+    Ok(all)
 }

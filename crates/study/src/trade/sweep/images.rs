@@ -3,7 +3,7 @@
 use super::Bench;
 use crate::trade::exact::Shot;
 use crate::trade::{Error, Fidelity, Outcome, Sweep, SweepRow, Unit, clock};
-use skinsplat_core::scene::{Camera, Image, Posed};
+use skinsplat_core::scene::{Camera, Image, OwnedPosed};
 use skinsplat_render::definition::{self, Cutoffs};
 use skinsplat_render::splat::{RenderSettings, Renderer};
 
@@ -40,11 +40,11 @@ fn ways() -> Vec<Way> {
 pub(super) fn cutoffs(bench: &Bench) -> Result<Sweep, Error> {
     let stage = bench.stage;
     let motion = &stage.motions[0];
-    let posed: Vec<Posed> =
+    let posed: Vec<OwnedPosed> =
         motion.shots.iter().map(|shot| shot.exactly(&stage.rig, &stage.avatar.gaussians)).collect();
-    let one = |way: &Way, posed: &Posed, shot: &Shot| -> Image {
+    let one = |way: &Way, posed: &OwnedPosed, shot: &Shot| -> Image {
         let settings = RenderSettings { antialiased: way.antialiased, ..stage.settings };
-        definition::draw(posed, &shot.camera, &settings, way.cutoffs).image
+        definition::draw(&posed.as_posed(), &shot.camera, &settings, way.cutoffs).image
     };
     let draw = |way: &Way| -> Vec<Image> {
         posed.iter().zip(&motion.shots).map(|(posed, shot)| one(way, posed, shot)).collect()
@@ -98,14 +98,14 @@ pub(super) fn resolutions(bench: &Bench) -> Result<Sweep, Error> {
     let stage = bench.stage;
     let motion = &stage.motions[0];
     let samples = if stage.options.quick { 2 } else { 4 };
-    let posed: Vec<Posed> =
+    let posed: Vec<OwnedPosed> =
         motion.shots.iter().map(|shot| shot.exactly(&stage.rig, &stage.avatar.gaussians)).collect();
     let truth: Vec<Image> = posed
         .iter()
         .zip(&motion.shots)
         .map(|(posed, shot)| {
             let camera = scaled(&shot.camera, (samples, 1));
-            let drawn = definition::draw(posed, &camera, &stage.settings, Cutoffs::NONE).image;
+            let drawn = definition::draw(&posed.as_posed(), &camera, &stage.settings, Cutoffs::NONE).image;
             averaged(&drawn, samples as usize)
         })
         .collect();
@@ -118,7 +118,8 @@ pub(super) fn resolutions(bench: &Bench) -> Result<Sweep, Error> {
                 .iter()
                 .zip(&motion.shots)
                 .map(|(posed, shot)| {
-                    let drawn = renderer.render(posed, &scaled(&shot.camera, share), &settings).image;
+                    let drawn =
+                        renderer.render(&posed.as_posed(), &scaled(&shot.camera, share), &settings).image;
                     if share == (2, 1) {
                         averaged(&drawn, 2)
                     } else {

@@ -8,8 +8,10 @@ mod storage;
 
 use super::exact::Shot;
 use super::{Error, Fidelity, Spread, Stage, Sweep, clock};
-use skinsplat_core::scene::{Avatar, Binding, FaceBinding, Gaussians, Image, Posed, PosedBody, SkinWeights};
-use skinsplat_posing::{BoundAvatar, PoseBuffers, Strategy, pose_into};
+use skinsplat_core::scene::{
+    Avatar, Binding, FaceBinding, Gaussians, Image, OwnedPosed, PosedBody, SkinWeights,
+};
+use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
 use skinsplat_render::splat::Renderer;
 
 /// Ids of all sweeps, in reading order.
@@ -79,9 +81,10 @@ impl<'a> Bench<'a> {
     }
 
     /// Every shot of a motion, as `posed` poses it.
-    fn drawn<'p>(&self, motion: usize, mut posed: impl FnMut(&Shot) -> Posed<'p>) -> Vec<Image> {
+    fn drawn(&self, motion: usize, mut posed: impl FnMut(&Shot) -> OwnedPosed) -> Vec<Image> {
         let mut renderer = Renderer::new();
-        let draw = |shot: &Shot| renderer.render(&posed(shot), &shot.camera, &self.stage.settings).image;
+        let draw =
+            |shot: &Shot| renderer.render(&posed(shot).as_posed(), &shot.camera, &self.stage.settings).image;
         self.stage.motions[motion].shots.iter().map(draw).collect()
     }
 
@@ -99,17 +102,12 @@ impl<'a> Bench<'a> {
     /// Time to pose and draw one shot, seconds per frame, on one thread.
     fn frame_time(&self, bound: &BoundAvatar, strategy: &Strategy, shot: &Shot) -> Result<Spread, Error> {
         let body = PosedBody::new(&self.stage.rig.body, &shot.pose)?;
-        pose_into(bound, &body, strategy, &mut PoseBuffers::default())?;
-        let (mut renderer, mut buffers) = (Renderer::new(), PoseBuffers::default());
-        let mut rendered = renderer.render(
-            &pose_into(bound, &body, strategy, &mut buffers)?,
-            &shot.camera,
-            &self.stage.settings,
-        );
+        let (mut renderer, mut poser, options) = (Renderer::new(), Poser::new(), PoseOptions::default());
+        let posed = poser.pose(bound, &body, strategy, &options)?;
+        let mut rendered = renderer.render(&posed, &shot.camera, &self.stage.settings);
         Ok(self.time(|| {
-            if let Ok(posed) = pose_into(bound, &body, strategy, &mut buffers) {
+            if let Ok(posed) = poser.pose(bound, &body, strategy, &options) {
                 renderer.render_into(&posed, &shot.camera, &self.stage.settings, &mut rendered);
-                buffers.reclaim(posed);
             }
         }))
     }

@@ -8,9 +8,10 @@ use skinsplat_core::math::average::{Solver, Start};
 use skinsplat_core::math::rotation::SignPolicy;
 use skinsplat_core::scene::{Avatar, Image, PosedBody};
 use skinsplat_posing::{
-    BoundAvatar, ColourChoice, PoseBuffers, RotationChoice, Strategy, StrategyError, pose, pose_into,
+    BoundAvatar, ColourChoice, PoseOptions, Poser, PosingError, RotationChoice, Strategy, pose,
 };
 use skinsplat_render::splat::{Phase, Renderer};
+use std::hint::black_box;
 use std::time::Instant;
 
 /// Solvers that are posed as strategies, besides the closed form.
@@ -28,7 +29,7 @@ pub(super) fn strategies(bench: &Bench) -> Result<Sweep, Error> {
     let averages = SOLVERS.map(RotationChoice::QuaternionAverage);
     let mut rows = Vec::new();
     for (m, motion) in bench.stage.motions.iter().enumerate() {
-        for rotation in averages.into_iter().chain(RotationChoice::NAMED) {
+        for rotation in averages.into_iter().chain(RotationChoice::named()) {
             let strategy = Strategy { rotation, ..stock() };
             let note = match rotation {
                 RotationChoice::DualQuaternion => "means follow the dual quaternions too",
@@ -77,26 +78,23 @@ fn posed(
         let body = PosedBody::new(&stage.rig.body, &shot.pose)?;
         let posed = match pose(bound, &body, strategy) {
             Ok(posed) => posed,
-            Err(StrategyError::NoFaces { .. }) => return Ok(Err("the body has no faces".to_owned())),
+            Err(PosingError::NoFaces { .. }) => return Ok(Err("the body has no faces".to_owned())),
             Err(other) => return Err(other.into()),
         };
         angles = angles.zip(posed.rotations.as_ref()).map(|(mut all, rotations)| {
             all.push(angles_of(bench, shot, rotations));
             all
         });
-        images.push(skinsplat_render::splat::render(&posed, &shot.camera, &stage.settings).image);
+        images.push(skinsplat_render::splat::render(&posed.as_posed(), &shot.camera, &stage.settings).image);
     }
     let body = PosedBody::new(&stage.rig.body, &shots[0].pose)?;
     if strategy.rotation.needs_faces() {
         // Skinning the mesh is shared by everything that reads it.
         body.mesh();
     }
-    let mut buffers = PoseBuffers::default();
-    let time = bench.time(|| {
-        if let Ok(posed) = pose_into(bound, &body, strategy, &mut buffers) {
-            buffers.reclaim(posed);
-        }
-    });
+    let (mut poser, options) = (Poser::new(), PoseOptions::default());
+    let time =
+        bench.time(|| poser.pose(bound, &body, strategy, &options).map(|posed| drop(black_box(posed))));
     let degrees: Option<Degrees> = angles.and_then(degrees);
     Ok(Ok(Outcome {
         time: Some(time.per(bound.len())),
@@ -182,23 +180,22 @@ fn coloured(bench: &Bench, m: usize, bound: &BoundAvatar, strategy: &Strategy) -
     for shot in shots {
         let body = PosedBody::new(&stage.rig.body, &shot.pose)?;
         let posed = pose(bound, &body, strategy)?;
-        images.push(skinsplat_render::splat::render(&posed, &shot.camera, &stage.settings).image);
+        images.push(skinsplat_render::splat::render(&posed.as_posed(), &shot.camera, &stage.settings).image);
     }
     let shot = &shots[0];
     let body = PosedBody::new(&stage.rig.body, &shot.pose)?;
     let times = bench.pool.install(|| {
-        let (mut renderer, mut buffers) = (Renderer::new(), PoseBuffers::default());
+        let (mut renderer, mut poser, options) = (Renderer::new(), Poser::new(), PoseOptions::default());
         let mut rendered = None;
         let mut times = Vec::new();
         for _ in 0..=stage.options.repeats {
             let start = Instant::now();
-            let posed = pose_into(bound, &body, strategy, &mut buffers)?;
+            let posed = poser.pose(bound, &body, strategy, &options)?;
             let posing = start.elapsed();
             let target =
                 rendered.get_or_insert_with(|| renderer.render(&posed, &shot.camera, &stage.settings));
             let phases = renderer.render_profiled(&posed, &shot.camera, &stage.settings, target);
             times.push((posing + phases.of(Phase::Preprocess)).as_secs_f64().max(1e-9));
-            buffers.reclaim(posed);
         }
         Ok::<_, Error>(times)
     })?;

@@ -1,88 +1,23 @@
-//! Canonical avatar and posed body to [`Posed`], a chunk of Gaussians at a time.
+//! Canonical avatar and posed body to [`Posed`], a chunk of Gaussians at a time, in memory that is kept.
 
-use super::bound::{Moves, expect_count};
+use super::adjoint;
+use super::bound::Moves;
 use super::covariance::factors;
 use super::frame::{Frame, Visitor};
-use super::layout::{CHUNK, Lanes};
-use super::rotate::{BlockInput, Turn, take};
-use super::{
-    BoundAvatar, ColourChoice, CovarianceChoice, JointLift, LbsProjection, RotationChoice, Strategy,
-    StrategyError, colour,
-};
+use super::lanes::{Lanes, take};
+use super::layout::CHUNK;
+use super::options::PoseOptions;
+use super::rotate::{BlockInput, Rotated};
+use super::{BoundAvatar, ColourChoice, CovarianceChoice, PosingError, Strategy, colour};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use skinsplat_core::math::{Quaternion, rotation};
-use skinsplat_core::scene::{Camera, Posed, PosedBody};
-use std::borrow::Cow;
+use skinsplat_core::scene::{AvatarGradient, Gaussians, OwnedPosed, Posed, PosedBody, PosedGradient};
 
-/// Poses an avatar.
-///
-/// Means: Eq. 6 (LBS) for Gaussians with weights of their own, except under dual-quaternion blending and HAHA's scaled
-/// frames; `Σ b_k v_k + unit(Σ b_k n_k) offset` on the posed mesh for face-bound ones, under every strategy but the
-/// latter. What a strategy does not need is not computed. The result is the same, bit
-/// for bit, for any number of threads and any width of vector instructions.
-///
-/// # Errors
-/// [`StrategyError::NoFaces`] if the strategy reads faces and the body has none, [`StrategyError::OtherBody`] if the
-/// avatar was bound to a body of other counts.
-pub fn pose<'a>(
-    bound: &'a BoundAvatar,
-    body: &PosedBody<'_>,
-    strategy: &Strategy,
-) -> Result<Posed<'a>, StrategyError> {
-    pose_on(pulp::Arch::new(), bound, body, strategy, &mut PoseBuffers::default())
-}
-
-/// [`pose`] into memory that a pose of before has left: at 100,000 Gaussians fresh memory costs as much as the work.
-///
-/// # Errors
-/// As [`pose`]; the buffers are kept.
-pub fn pose_into<'a>(
-    bound: &'a BoundAvatar,
-    body: &PosedBody<'_>,
-    strategy: &Strategy,
-    buffers: &mut PoseBuffers,
-) -> Result<Posed<'a>, StrategyError> {
-    pose_on(pulp::Arch::new(), bound, body, strategy, buffers)
-}
-
-/// [`pose_into`] for one camera: Gaussians that it surely does not see are moved, but neither turned nor coloured. The
-/// image has the same bits as that of [`pose`]. For Gaussians with weights of their own and covariances that are rotated;
-/// others are posed in full.
-///
-/// # Errors
-/// As [`pose`]; the buffers are kept.
-pub fn pose_seen<'a>(
-    bound: &'a BoundAvatar,
-    body: &PosedBody<'_>,
-    strategy: &Strategy,
-    camera: &Camera,
-    buffers: &mut PoseBuffers,
-) -> Result<Posed<'a>, StrategyError> {
-    let frame = Frame::new(pulp::Arch::new(), bound, body, strategy, None)?.seen_by(camera);
-    Ok(pose_frame(&frame, bound, buffers))
-}
-
-/// [`pose_into`] with the signs of a sequence: [`RotationChoice::LiftedSum`] reads `lift`, which is that of `body`, where
-/// [`pose`] takes the one from rest. Other strategies have no use for it.
-///
-/// # Errors
-/// As [`pose`], and [`StrategyError::Scene`] for a lift of another number of joints.
-pub fn pose_lifted<'a>(
-    bound: &'a BoundAvatar,
-    body: &PosedBody<'_>,
-    strategy: &Strategy,
-    lift: &JointLift,
-    buffers: &mut PoseBuffers,
-) -> Result<Posed<'a>, StrategyError> {
-    expect_count("joint quaternions", lift.quaternions().len(), body.joints.len())?;
-    let frame = Frame::new(pulp::Arch::new(), bound, body, strategy, Some(lift))?;
-    Ok(pose_frame(&frame, bound, buffers))
-}
-
-/// Memory of poses that are no longer needed: [`pose_into`] takes it, [`PoseBuffers::reclaim`] gives it back.
+/// Poses avatars, and owns the memory of the last pose: at 100,000 Gaussians fresh memory costs as much as the work.
 #[derive(Debug, Default)]
-pub struct PoseBuffers {
+pub struct Poser {
+    arch: pulp::Arch,
     means: Vec<Vec3>,
     factors: Vec<Mat3>,
     rotations: Vec<Quaternion<f32>>,
@@ -90,72 +25,115 @@ pub struct PoseBuffers {
     sh: Vec<[f32; 3]>,
 }
 
-impl PoseBuffers {
-    /// Takes the memory of a pose. What it does not have (a strategy does not produce everything) is kept.
-    pub fn reclaim(&mut self, posed: Posed<'_>) {
-        self.means = posed.means;
-        self.factors = posed.factors;
-        if let Some(rotations) = posed.rotations {
-            self.rotations = rotations;
-        }
-        if let Some(view_frames) = posed.view_frames {
-            self.view_frames = view_frames;
-        }
-        if let Cow::Owned(sh) = posed.sh {
-            self.sh = sh;
+impl Poser {
+    /// One without memory yet, for the processor that it runs on.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// With the instructions of one kind of processor.
+    #[cfg(test)]
+    fn on(arch: pulp::Arch) -> Self {
+        Self { arch, ..Self::default() }
+    }
+
+    /// Poses an avatar.
+    ///
+    /// Means: Eq. 6 (LBS) for Gaussians with weights of their own, except under dual-quaternion blending and HAHA's scaled
+    /// frames; `Σ b_k v_k + unit(Σ b_k n_k) offset` on the posed mesh for face-bound ones, under every strategy but the
+    /// latter. What a strategy does not need is not computed. The result is the same, bit for bit, for any number of
+    /// threads and any width of vector instructions.
+    ///
+    /// # Errors
+    /// [`PosingError::NoFaces`] if the strategy reads faces and the body has none, [`PosingError::OtherBody`] if the avatar
+    /// was bound to a body of other counts, [`PosingError::Scene`] for a lift of another number of joints and rotations of
+    /// another number of Gaussians.
+    pub fn pose<'p>(
+        &'p mut self,
+        bound: &'p BoundAvatar,
+        body: &PosedBody<'_>,
+        strategy: &Strategy,
+        options: &PoseOptions<'_>,
+    ) -> Result<Posed<'p>, PosingError> {
+        let frame = Frame::new(self.arch, bound, body, strategy, options)?;
+        let produces = Produces::of(&frame);
+        let parts = self.outputs(bound, &produces).split(bound.sh_count());
+        parts.into_par_iter().enumerate().for_each(|(number, outputs)| {
+            PoseChunk { frame: &frame, start: number * CHUNK, outputs, relative: Vec::new() }.run(number);
+        });
+        Ok(Posed {
+            means: &self.means,
+            factors: &self.factors,
+            opacities: &bound.opacities,
+            sh_degree: bound.sh_degree,
+            sh: if produces.sh { &self.sh } else { &bound.sh },
+            view_frames: produces.view_frames.then_some(self.view_frames.as_slice()),
+            colour_clamp: strategy.clamp.into(),
+            rotations: produces.rotations.then_some(self.rotations.as_slice()),
+        })
+    }
+
+    /// Adds to `gradient` what a pose contributes, so that the frames of a batch sum in the order of the calls: the
+    /// transposed derivative of [`Self::pose`] applied to `upstream`. `gaussians` are those that `bound` was made of or
+    /// last updated with; `gradient` is one that [`AvatarGradient::reset`] made for them. A camera in the options changes
+    /// nothing: what it does not see has no derivatives.
+    ///
+    /// Exact for every strategy, piecewise where a strategy chooses (the branch of a matrix-to-quaternion conversion, the
+    /// thin axis of a disc). Two dependencies are left out, as the stock methods leave them out or because
+    /// [`PosedGradient`] has no place for them:
+    /// * barycentric coordinates move the position only, neither the skinning weights mixed with them nor a vertex average;
+    /// * frames in which view directions are read do not follow parameters (only those of a conversion of B R_c could).
+    ///
+    /// The result is the same, bit for bit, for any number of threads and any width of vector instructions.
+    ///
+    /// # Errors
+    /// Those of [`Self::pose`], and [`PosingError::Scene`] for arrays whose length does not fit the bound avatar. Nothing
+    /// was added then.
+    pub fn backward(
+        &mut self,
+        bound: &BoundAvatar,
+        body: &PosedBody<'_>,
+        strategy: &Strategy,
+        options: &PoseOptions<'_>,
+        gaussians: &Gaussians,
+        upstream: &PosedGradient,
+        gradient: &mut AvatarGradient,
+    ) -> Result<(), PosingError> {
+        let options = PoseOptions { seen_by: None, ..*options };
+        let frame = Frame::new(self.arch, bound, body, strategy, &options)?;
+        adjoint::add(&frame, gaussians, upstream, gradient)
+    }
+
+    /// The memory, with an entry of any value for everything that is produced.
+    fn outputs(&mut self, bound: &BoundAvatar, produces: &Produces) -> Outputs<'_> {
+        let n = bound.len();
+        let count = |produced, count| if produced { count } else { 0 };
+        self.means.resize(n, Vec3::ZERO);
+        self.factors.resize(n, Mat3::ZERO);
+        self.rotations.resize(count(produces.rotations, n), [0.0; 4]);
+        self.view_frames.resize(count(produces.view_frames, n), Mat3::ZERO);
+        self.sh.resize(count(produces.sh, bound.sh.len()), [0.0; 3]);
+        Outputs {
+            means: &mut self.means,
+            factors: &mut self.factors,
+            rotations: &mut self.rotations,
+            view_frames: &mut self.view_frames,
+            sh: &mut self.sh,
         }
     }
 }
 
-/// The memory, with `n` entries of any value.
-fn sized<T: Clone>(memory: &mut Vec<T>, n: usize, zero: T) -> Vec<T> {
-    let mut memory = std::mem::take(memory);
-    memory.resize(n, zero);
-    memory
-}
-
-/// [`pose_into`] with the instructions of one kind of processor.
-fn pose_on<'a>(
-    arch: pulp::Arch,
-    bound: &'a BoundAvatar,
+/// One pose, to keep: [`Poser::pose`] without options, in memory of its own.
+///
+/// # Errors
+/// As [`Poser::pose`].
+pub fn pose(
+    bound: &BoundAvatar,
     body: &PosedBody<'_>,
     strategy: &Strategy,
-    buffers: &mut PoseBuffers,
-) -> Result<Posed<'a>, StrategyError> {
-    Ok(pose_frame(&Frame::new(arch, bound, body, strategy, None)?, bound, buffers))
-}
-
-/// Walks all blocks of a frame of `bound`.
-fn pose_frame<'a>(frame: &Frame<'_>, bound: &'a BoundAvatar, buffers: &mut PoseBuffers) -> Posed<'a> {
-    let strategy = frame.strategy;
-    let produces = Produces::of(strategy, bound);
-    let n = bound.len();
-    let mut means = sized(&mut buffers.means, n, Vec3::ZERO);
-    let mut factors = sized(&mut buffers.factors, n, Mat3::ZERO);
-    let mut rotations = produces.rotations.then(|| sized(&mut buffers.rotations, n, [0.0; 4]));
-    let mut view_frames = produces.view_frames.then(|| sized(&mut buffers.view_frames, n, Mat3::ZERO));
-    let mut sh = produces.sh.then(|| sized(&mut buffers.sh, bound.sh.len(), [0.0; 3]));
-    let outputs = Outputs {
-        means: &mut means,
-        factors: &mut factors,
-        rotations: rotations.as_deref_mut().unwrap_or_default(),
-        view_frames: view_frames.as_deref_mut().unwrap_or_default(),
-        sh: sh.as_deref_mut().unwrap_or_default(),
-    };
-    let parts = outputs.split(bound.sh_count());
-    parts.into_par_iter().enumerate().for_each(|(c, outputs)| {
-        PoseChunk { frame, start: c * CHUNK, outputs, turns: Vec::new() }.run(c);
-    });
-    Posed {
-        means,
-        factors,
-        opacities: Cow::Borrowed(&bound.opacities),
-        sh_degree: bound.sh_degree,
-        sh: sh.map_or(Cow::Borrowed(&bound.sh), Cow::Owned),
-        view_frames,
-        colour_clamp: strategy.clamp.into(),
-        rotations,
-    }
+) -> Result<OwnedPosed, PosingError> {
+    let mut poser = Poser::new();
+    poser.pose(bound, body, strategy, &PoseOptions::default()).map(Posed::into_owned)
 }
 
 /// Which of the optional outputs a strategy produces. Colours of degree 0 look the same from everywhere.
@@ -166,10 +144,9 @@ struct Produces {
 }
 
 impl Produces {
-    fn of(strategy: &Strategy, bound: &BoundAvatar) -> Self {
-        let raw = strategy.rotation == RotationChoice::Lbs(LbsProjection::MatrixToQuaternionRaw);
+    fn of(Frame { bound, strategy, source, .. }: &Frame<'_>) -> Self {
         let rotations = match strategy.covariance {
-            CovarianceChoice::Rotate | CovarianceChoice::Surfel => !raw,
+            CovarianceChoice::Rotate | CovarianceChoice::Surfel => !source.is_raw(),
             CovarianceChoice::Affine | CovarianceChoice::AffineConjugate => false,
         };
         let (view_frames, sh) = match strategy.colour {
@@ -219,7 +196,7 @@ struct PoseChunk<'f, 'a, 'o> {
     start: usize,
     outputs: Outputs<'o>,
     /// R of each Gaussian, for the SH, zero for one that is not seen; empty if they stay.
-    turns: Vec<Quaternion<f32>>,
+    relative: Vec<Quaternion<f32>>,
 }
 
 impl PoseChunk<'_, '_, '_> {
@@ -227,18 +204,17 @@ impl PoseChunk<'_, '_, '_> {
     fn run(mut self, number: usize) {
         let (frame, start) = (self.frame, self.start);
         if !self.outputs.sh.is_empty() {
-            self.turns.resize(self.outputs.means.len(), [0.0; 4]);
+            self.relative.resize(self.outputs.means.len(), [0.0; 4]);
         }
         let chunk = &frame.bound.chunks(frame.strategy.covariance)[number];
         frame.walk(chunk, start, &mut self);
         self.means_on_mesh();
         let (degree, count) = (frame.bound.sh_degree, frame.bound.sh_count());
         let input = frame.bound.sh[start * count..].chunks_exact(count);
-        for ((turn, input), output) in
-            self.turns.iter().zip(input).zip(self.outputs.sh.chunks_exact_mut(count))
-        {
-            if *turn != [0.0; 4] {
-                colour::rotate_sh(*turn, degree, input, output);
+        let output = self.outputs.sh.chunks_exact_mut(count);
+        for ((quat, input), output) in self.relative.iter().zip(input).zip(output) {
+            if *quat != [0.0; 4] {
+                colour::rotate_sh(*quat, degree, input, output);
             }
         }
     }
@@ -248,17 +224,17 @@ impl PoseChunk<'_, '_, '_> {
         let Frame { bound, body, .. } = self.frame;
         let Some(surface) = &bound.surface else { return };
         let on_faces = bound.moves == Moves::WithFaces;
-        if !on_faces && !self.frame.scales_with_faces() {
+        if !on_faces && self.frame.source.scaled_faces().is_none() {
             return;
         }
         let mesh = body.mesh();
-        let seats = &surface.seats[self.start..];
-        for (i, (mean, seat)) in self.outputs.means.iter_mut().zip(seats).enumerate() {
+        let embeddings = &surface.embeddings[self.start..];
+        for (i, (mean, embedding)) in self.outputs.means.iter_mut().zip(embeddings).enumerate() {
             let gaussian = self.start + i;
             if let Some(motion) = self.frame.face_motion(gaussian) {
                 *mean = motion.apply(bound.means[gaussian]);
             } else if on_faces {
-                *mean = seat.point(mesh);
+                *mean = embedding.point(mesh);
             }
         }
     }
@@ -266,11 +242,11 @@ impl PoseChunk<'_, '_, '_> {
 
 impl Visitor for PoseChunk<'_, '_, '_> {
     #[inline(always)]
-    fn block(&mut self, _: usize, input: &BlockInput<'_>, turn: &Turn, scales: &[Lanes; 3]) {
+    fn block(&mut self, _: usize, input: &BlockInput<'_>, rotated: &Rotated, scales: &[Lanes; 3]) {
         let Frame { bound, strategy, .. } = self.frame;
         let block = input.block;
-        let factors = factors(strategy.covariance, &turn.posed, input.blend, &block.rotations, scales);
-        let means = match (bound.moves, &turn.means) {
+        let factors = factors(strategy.covariance, &rotated.posed, input.blend, &block.rotations, scales);
+        let means = match (bound.moves, &rotated.means) {
             (Moves::Not | Moves::WithFaces, _) => block.means,
             (Moves::ByWeights, Some(means)) => *means,
             (Moves::ByWeights, None) => input.blend.transform(&block.means),
@@ -282,15 +258,15 @@ impl Visitor for PoseChunk<'_, '_, '_> {
             let column = |c: usize| Vec3::new(factors[c][lane], factors[3 + c][lane], factors[6 + c][lane]);
             outputs.factors[i] = Mat3::from_cols(column(0), column(1), column(2));
             if let Some(rotation) = outputs.rotations.get_mut(i) {
-                *rotation = take(&turn.posed, lane);
+                *rotation = take(&rotated.posed, lane);
             }
-            if let Some(relative) = self.turns.get_mut(i) {
-                *relative = take(&turn.relative, lane);
+            if let Some(relative) = self.relative.get_mut(i) {
+                *relative = take(&rotated.relative, lane);
             }
         }
         if !outputs.view_frames.is_empty() {
             for lane in 0..block.count {
-                let frame = colour::view_frame(strategy.colour, &turn.relative, input, lane);
+                let frame = colour::view_frame(strategy.colour, &rotated.relative, input, lane);
                 outputs.view_frames[usize::from(block.index[lane])] = frame;
             }
         }
@@ -298,7 +274,7 @@ impl Visitor for PoseChunk<'_, '_, '_> {
 
     /// What is left of a Gaussian that is not drawn has a place and no extent.
     #[inline(always)]
-    fn unseen(&mut self, input: &BlockInput<'_>, means: &[Lanes; 3]) {
+    fn culled(&mut self, input: &BlockInput<'_>, means: &[Lanes; 3]) {
         let outputs = &mut self.outputs;
         for lane in 0..input.block.count {
             let i = usize::from(input.block.index[lane]);
@@ -317,12 +293,9 @@ impl Visitor for PoseChunk<'_, '_, '_> {
 #[cfg(test)]
 mod tests {
     use super::super::PRESETS;
-    use super::super::adjoint::backward_on;
     use super::*;
     use glam::DVec3;
-    use skinsplat_core::scene::{
-        Avatar, AvatarGradient, Binding, Gaussians, Pose, PosedGradient, RestBody, Skeleton, SkinWeights,
-    };
+    use skinsplat_core::scene::{Avatar, Binding, Pose, RestBody, Skeleton, SkinWeights};
 
     /// A fan of triangles over a chain of six joints, and a Gaussian per vertex that hangs on one to six of them.
     fn fan() -> (RestBody, Avatar) {
@@ -360,25 +333,26 @@ mod tests {
         let at = Pose::from_axis_angles(&body.skeleton, &angles, DVec3::Z);
         let body = PosedBody::new(&body, &at).unwrap();
         for preset in PRESETS {
-            let narrow =
-                pose_on(pulp::Arch::Scalar, &bound, &body, &preset.strategy, &mut PoseBuffers::default())
-                    .unwrap();
-            assert_eq!(narrow, pose(&bound, &body, &preset.strategy).unwrap(), "{}", preset.id);
+            let (strategy, options) = (&preset.strategy, PoseOptions::default());
+            let mut posers = [pulp::Arch::Scalar, pulp::Arch::new()].map(Poser::on);
+            let narrow = posers[0].pose(&bound, &body, strategy, &options).unwrap().into_owned();
+            assert_eq!(narrow, pose(&bound, &body, strategy).unwrap(), "{}", preset.id);
 
             // The pose serves as its own derivative.
             let upstream = PosedGradient {
                 means: narrow.means,
                 factors: narrow.factors,
-                opacities: narrow.opacities.into_owned(),
-                sh: narrow.sh.into_owned(),
+                opacities: narrow.opacities,
+                sh: narrow.sh,
                 ..PosedGradient::default()
             };
-            let [narrow, wide] = [pulp::Arch::Scalar, pulp::Arch::new()].map(|arch| {
+            let [narrow, wide] = posers.each_mut().map(|poser| {
                 let mut gradient = AvatarGradient::default();
                 let gaussians = &avatar.gaussians;
                 gradient.reset(gaussians, false);
-                let strategy = &preset.strategy;
-                backward_on(arch, &bound, &body, strategy, gaussians, &upstream, &mut gradient).unwrap();
+                poser
+                    .backward(&bound, &body, strategy, &options, gaussians, &upstream, &mut gradient)
+                    .unwrap();
                 gradient
             });
             assert_eq!(narrow, wide, "{}", preset.id);

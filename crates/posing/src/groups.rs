@@ -1,37 +1,37 @@
 //! The Gaussians of an avatar by the joints that they hang on: what bounds need to know of their weights, once per avatar.
 
-use super::super::layout::{Block, Chunk};
+use super::layout::{Block, Chunk};
 use std::collections::BTreeMap;
 
 /// Influences up to which pairs of weights are remembered. Beyond, only distances to the heaviest bone are used.
 const PAIRED: usize = 24;
 
 /// How many influences one may ask to keep.
-pub(super) const KEPT: usize = 4;
+pub(crate) const KEPT: usize = 4;
 
 /// Gaussians on the same joints with the same heaviest one (the first of equals).
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Group {
     /// The joints, ascending.
-    pub(super) joints: Vec<u16>,
+    pub(crate) joints: Vec<u16>,
     /// Position of the heaviest in `joints`.
-    pub(super) heaviest: usize,
+    pub(crate) heaviest: usize,
     /// Gaussians.
-    pub(super) count: u64,
+    pub(crate) count: u64,
     /// The largest share of each joint in the weights of a Gaussian.
-    pub(super) share: Vec<f64>,
+    pub(crate) share: Vec<f64>,
     /// The largest share of all joints but the heaviest together.
-    pub(super) light: f64,
+    pub(crate) light: f64,
     /// The largest product of the shares of i < j, row after row; empty beyond [`PAIRED`] joints.
-    pub(super) products: Vec<f64>,
+    pub(crate) products: Vec<f64>,
     /// The smallest Σ share².
-    pub(super) concentration: f64,
+    pub(crate) concentration: f64,
     /// The smallest difference between the two heaviest shares.
-    pub(super) imbalance: f64,
+    pub(crate) imbalance: f64,
     /// `dropped[k - 1]`: the largest share of all but the k heaviest.
-    pub(super) dropped: [f64; KEPT],
+    pub(crate) dropped: [f64; KEPT],
     /// The largest |Σ w − 1|.
-    pub(super) excess: f64,
+    pub(crate) excess: f64,
 }
 
 /// The shares of one Gaussian.
@@ -55,7 +55,7 @@ impl Shares {
 }
 
 /// The groups of all chunks, by joints, then by heaviest.
-pub(in super::super) fn groups(chunks: &[Chunk]) -> Vec<Group> {
+pub(crate) fn groups(chunks: &[Chunk]) -> Vec<Group> {
     let mut found: BTreeMap<(Vec<u16>, usize), Group> = BTreeMap::new();
     for chunk in chunks {
         for block in &chunk.blocks {
@@ -73,7 +73,7 @@ pub(in super::super) fn groups(chunks: &[Chunk]) -> Vec<Group> {
 }
 
 /// The weights of every Gaussian of a group, a row each.
-pub(super) fn weights(chunks: &[Chunk], group: &Group) -> Vec<Vec<f64>> {
+pub(crate) fn weights(chunks: &[Chunk], group: &Group) -> Vec<Vec<f64>> {
     let blocks = chunks.iter().flat_map(|chunk| chunk.blocks.iter().map(move |block| (chunk, block)));
     let own = blocks.filter(|(chunk, block)| chunk.influences(block).0 == group.joints);
     let lanes =
@@ -83,7 +83,7 @@ pub(super) fn weights(chunks: &[Chunk], group: &Group) -> Vec<Vec<f64>> {
 
 impl Group {
     /// The joints, ascending.
-    pub(in super::super) fn joints(&self) -> &[u16] {
+    pub(crate) fn joints(&self) -> &[u16] {
         &self.joints
     }
 
@@ -128,7 +128,7 @@ impl Group {
 
     /// An upper bound of Σ share_j value_j over the joints but the heaviest: the largest values first, as far as shares
     /// allow.
-    pub(super) fn most(&self, order: &[usize], value: impl Fn(usize) -> f64) -> f64 {
+    pub(crate) fn most(&self, order: &[usize], value: impl Fn(usize) -> f64) -> f64 {
         let (mut left, mut sum) = (self.light, 0.0);
         for &j in order {
             let share = self.share[j].min(left);
@@ -139,7 +139,7 @@ impl Group {
     }
 
     /// The joint numbers of the pairs of `products`.
-    pub(super) fn pairs(&self) -> impl Iterator<Item = (u16, u16)> + '_ {
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = (u16, u16)> + '_ {
         let n = self.joints.len();
         (0..n).flat_map(move |i| (i + 1..n).map(move |j| (self.joints[i], self.joints[j])))
     }

@@ -1,30 +1,26 @@
-//! What a camera surely does not see, so that it need not be turned or coloured.
+//! What a camera surely does not see, so that it need not be rotated or coloured.
 
 use super::blend::Blend;
-use super::layout::{Block, LANES, Lanes};
+use super::lanes::{LANES, Lanes};
+use super::layout::Block;
 use skinsplat_core::scene::Camera;
+use skinsplat_core::scene::rasterizer::{
+    DEVIATIONS, JACOBIAN_LIMIT, LEAST_DISCRIMINANT, LOW_PASS, NEAR, TILE,
+};
 
-/// Depth below which the rasterizer draws nothing, metres.
-const NEAR: f32 = 0.2;
-
-/// How far beyond half the field of view the rasterizer lets the slope of its Jacobian grow.
-const JACOBIAN_LIMIT: f64 = 1.3;
-
-/// What the low-pass (0.3 on each axis) and the rasterizer's floor under a square root (0.1) can add to the larger
-/// eigenvalue of a screen covariance, pixels².
+/// At least what the low-pass and the floor under a square root can add to the larger eigenvalue of a screen covariance,
+/// pixels².
 const ADDED: f32 = 1.0;
+const _: () = assert!(ADDED as f64 > LOW_PASS + LEAST_DISCRIMINANT && LEAST_DISCRIMINANT < 0.4);
 
 /// What rounding may add to the radius, pixels, and how much of it.
 const MARGIN: f32 = 3.0;
 const SLACK: f32 = 1.01;
 
-/// Pixels of a tile.
-const TILE: f32 = 16.0;
-
 /// A camera, as a test for blocks. The test is the rasterizer's own (near plane; square of three standard deviations around
-/// the centre, against tiles), with a bound in place of the covariance and a margin for rounding: what it hides is not
+/// the centre, against tiles), with a bound in place of the covariance and a margin for rounding: what it culls is not
 /// drawn.
-pub(super) struct Sight {
+pub(super) struct Frustum {
     rows: [[f32; 4]; 3],
     focal: [f32; 2],
     centre: [f32; 2],
@@ -34,7 +30,7 @@ pub(super) struct Sight {
     stretch: f32,
 }
 
-impl Sight {
+impl Frustum {
     pub(super) fn new(camera: &Camera) -> Self {
         let m = camera.camera_from_world;
         let norm = |k: usize| m.row(k).truncate().length();
@@ -46,7 +42,7 @@ impl Sight {
         };
         let stretch =
             row(0, camera.fx, camera.cx, camera.width) + row(1, camera.fy, camera.cy, camera.height);
-        let end = [camera.width, camera.height].map(|size| (size as f32 / TILE).ceil() * TILE);
+        let end = [camera.width, camera.height].map(|size| (size as f32 / TILE as f32).ceil() * TILE as f32);
         Self {
             rows: [0, 1, 2].map(|k| m.row(k).as_vec4().to_array()),
             focal: [camera.fx as f32, camera.fy as f32],
@@ -58,7 +54,7 @@ impl Sight {
 
     /// The posed means of a block if none of its Gaussians can be seen.
     #[inline(always)]
-    pub(super) fn hides(&self, block: &Block, blend: &Blend) -> Option<[Lanes; 3]> {
+    pub(super) fn culls(&self, block: &Block, blend: &Blend) -> Option<[Lanes; 3]> {
         let means = blend.transform(&block.means);
         let mut hidden = 0;
         for lane in 0..LANES {
@@ -69,13 +65,14 @@ impl Sight {
             let scale = block.scales[0][lane].max(block.scales[1][lane]).max(block.scales[2][lane]);
             let inverse = 1.0 / z;
             let radius =
-                3.0 * (self.stretch * scale * scale * inverse * inverse + ADDED).sqrt() * SLACK + MARGIN;
+                DEVIATIONS as f32 * (self.stretch * scale * scale * inverse * inverse + ADDED).sqrt() * SLACK
+                    + MARGIN;
             let (u, v) =
                 (x * inverse * self.focal[0] + self.centre[0], y * inverse * self.focal[1] + self.centre[1]);
             let (reach_u, reach_v) = (radius + u.abs() * 1e-4, radius + v.abs() * 1e-4);
             let magnitude = x.abs() + y.abs() + z.abs() + self.rows[2][3].abs();
-            let behind = z < NEAR - 1e-4 * magnitude;
-            let before = z > NEAR;
+            let behind = z < NEAR as f32 - 1e-4 * magnitude;
+            let before = z > NEAR as f32;
             let off = (u + reach_u < 0.0)
                 | (v + reach_v < 0.0)
                 | (u - reach_u > self.end[0])

@@ -1,15 +1,15 @@
-//! Where Gaussians sit on the mesh.
+//! Where Gaussians are embedded in the mesh.
 
-use super::bound::expect_count;
+use super::error::expect_count;
 use super::nearest::NearestFace;
 use super::rest_faces::RestFaces;
 use glam::Vec3;
 use rayon::prelude::*;
 use skinsplat_core::scene::{FaceBinding, PosedMesh, RestBody, SceneError};
 
-/// Where a Gaussian sits on the mesh.
+/// Where a Gaussian is embedded in the mesh: a face, a point of its plane, and a distance from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Seat {
+pub(crate) struct Embedding {
     /// Face index.
     pub(crate) face: u32,
     /// Its vertices.
@@ -20,7 +20,7 @@ pub(crate) struct Seat {
     pub(crate) offset: f32,
 }
 
-impl Seat {
+impl Embedding {
     /// The point on a mesh: `Σ b v + unit(Σ b n) offset`.
     #[inline]
     pub(crate) fn point(&self, PosedMesh { vertices, normals }: &PosedMesh) -> Vec3 {
@@ -60,33 +60,33 @@ pub(crate) struct Surface {
     /// All faces of the body.
     pub(crate) faces: RestFaces,
     /// One per Gaussian.
-    pub(crate) seats: Vec<Seat>,
-    /// Per face: a Gaussian sits on it.
+    pub(crate) embeddings: Vec<Embedding>,
+    /// Per face: a Gaussian is embedded in it.
     pub(crate) face_used: Vec<bool>,
     /// Per vertex: it is a corner of such a face.
     pub(crate) vertex_used: Vec<bool>,
 }
 
 impl Surface {
-    pub(crate) fn new(seats: Vec<Seat>, body: &RestBody) -> Self {
+    pub(crate) fn new(embeddings: Vec<Embedding>, body: &RestBody) -> Self {
         let faces = RestFaces::new(body);
         let mut face_used = vec![false; body.faces.len()];
         let mut vertex_used = vec![false; body.vertices.len()];
-        for seat in &seats {
-            face_used[seat.face as usize] = true;
-            seat.corners.iter().for_each(|&v| vertex_used[v as usize] = true);
+        for embedding in &embeddings {
+            face_used[embedding.face as usize] = true;
+            embedding.corners.iter().for_each(|&v| vertex_used[v as usize] = true);
         }
-        Self { faces, seats, face_used, vertex_used }
+        Self { faces, embeddings, face_used, vertex_used }
     }
 
     /// Takes over coordinates and offsets; the faces must be the same.
-    pub(crate) fn reseat(&mut self, binding: &FaceBinding) -> Result<(), SceneError> {
-        expect_count("face", binding.faces.len(), self.seats.len())?;
-        expect_count("barycentric", binding.barycentric.len(), self.seats.len())?;
-        expect_count("offset", binding.offsets.len(), self.seats.len())?;
-        let mut faces = binding.faces.iter().zip(&self.seats);
-        if let Some(i) = faces.position(|(&face, seat)| face != seat.face) {
-            let expected = format!("face {} as at binding (bind anew)", self.seats[i].face);
+    pub(crate) fn update(&mut self, binding: &FaceBinding) -> Result<(), SceneError> {
+        expect_count("face", binding.faces.len(), self.embeddings.len())?;
+        expect_count("barycentric", binding.barycentric.len(), self.embeddings.len())?;
+        expect_count("offset", binding.offsets.len(), self.embeddings.len())?;
+        let mut faces = binding.faces.iter().zip(&self.embeddings);
+        if let Some(i) = faces.position(|(&face, own)| face != own.face) {
+            let expected = format!("face {} as at binding (bind anew)", self.embeddings[i].face);
             return Err(SceneError::new(
                 format!("face[{i}]"),
                 format!("face {}", binding.faces[i]),
@@ -94,42 +94,42 @@ impl Surface {
             ));
         }
         let places = binding.barycentric.iter().zip(&binding.offsets);
-        for (seat, (&barycentric, &offset)) in self.seats.iter_mut().zip(places) {
-            (seat.barycentric, seat.offset) = (barycentric, offset);
+        for (own, (&barycentric, &offset)) in self.embeddings.iter_mut().zip(places) {
+            (own.barycentric, own.offset) = (barycentric, offset);
         }
         Ok(())
     }
 
-    /// Where the Gaussians from index `start` on sit on the rest mesh.
+    /// The points of the rest mesh in which the Gaussians from index `start` on are embedded.
     pub(crate) fn rest_means(&self, start: usize, means: &mut [Vec3]) {
-        for (mean, seat) in means.iter_mut().zip(&self.seats[start..]) {
-            *mean = seat.point(&self.faces.mesh);
+        for (mean, embedding) in means.iter_mut().zip(&self.embeddings[start..]) {
+            *mean = embedding.point(&self.faces.mesh);
         }
     }
 }
 
-/// The points of the rest mesh nearest to the means. `before` are their seats before they moved, if anyone knows.
+/// The points of the rest mesh nearest to the means. `before` are their embeddings before they moved, if anyone knows.
 pub(crate) fn nearest(
     means: &[Vec3],
     body: &RestBody,
     faces: &NearestFace<'_>,
-    before: Option<&[Seat]>,
-) -> Vec<Seat> {
-    let seat = |(i, mean): (usize, &Vec3)| {
-        let guess = before.and_then(|seats| seats.get(i)).map(|seat| seat.face);
+    before: Option<&[Embedding]>,
+) -> Vec<Embedding> {
+    let embedding = |(i, mean): (usize, &Vec3)| {
+        let guess = before.and_then(|embeddings| embeddings.get(i)).map(|own| own.face);
         let point = faces.nearest(mean.as_dvec3(), guess);
         let barycentric = point.barycentric.map(|b| b as f32);
-        Seat { face: point.face, corners: body.faces[point.face as usize], barycentric, offset: 0.0 }
+        Embedding { face: point.face, corners: body.faces[point.face as usize], barycentric, offset: 0.0 }
     };
-    means.par_iter().enumerate().map(seat).collect()
+    means.par_iter().enumerate().map(embedding).collect()
 }
 
-/// The seats of face-bound Gaussians.
-pub(crate) fn given(binding: &FaceBinding, body: &RestBody) -> Vec<Seat> {
+/// The embeddings of face-bound Gaussians.
+pub(crate) fn given(binding: &FaceBinding, body: &RestBody) -> Vec<Embedding> {
     let places = binding.faces.iter().zip(&binding.barycentric).zip(&binding.offsets);
-    let seat = |((&face, &barycentric), &offset)| {
+    let embedding = |((&face, &barycentric), &offset)| {
         let corners = body.faces[face as usize];
-        Seat { face, corners, barycentric, offset }
+        Embedding { face, corners, barycentric, offset }
     };
-    places.map(seat).collect()
+    places.map(embedding).collect()
 }
