@@ -1,4 +1,4 @@
-//! What everything else stands on: [`math`] of rotations and spherical harmonics, and the types of a [`scene`].
+#![doc = include_str!("../README.md")]
 
 pub mod math;
 pub mod scene;

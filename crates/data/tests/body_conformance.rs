@@ -47,7 +47,7 @@ fn check_subjects(root: &Path) -> (f64, usize) {
                 let mesh = posed.mesh();
                 let found = ids.iter().map(|&i| mesh.vertices[i].as_dvec3());
                 let error = max_distance(found, &vertices[k * ids.len()..]);
-                let world = sequence.body.skeleton.world_transforms(pose);
+                let world = sequence.body.skeleton.world_transforms(&pose.locals);
                 let found = world.iter().map(|t| t.translation + pose.translation);
                 let joint_error = max_distance(found, &joints[k * num_joints..(k + 1) * num_joints]);
                 assert!(error <= SMPL_TOLERANCE, "{} frame {frame}: {error} m", path.display());

@@ -229,12 +229,13 @@ impl AdjointChunk<'_, '_, '_> {
         let torque = (source.converts() && self.rotates_sh()).then(|| self.torque(input, rotated));
         match (self.frame.strategy.covariance, torque) {
             (CovarianceChoice::Rotate | CovarianceChoice::Surfel, torque) => {
-                rotation_adjoint(source, input, rotated, of_covariance, torque.as_ref())
+                rotation_adjoint(self.frame.arch, source, input, rotated, of_covariance, torque.as_ref())
             }
             (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, None) => *of_covariance,
             (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, torque) => {
                 let none = [[0.0; LANES]; 4];
-                let of_colour = rotation_adjoint(source, input, rotated, &none, torque.as_ref());
+                let of_colour =
+                    rotation_adjoint(self.frame.arch, source, input, rotated, &none, torque.as_ref());
                 lanes::sum(of_covariance, &of_colour)
             }
         }

@@ -1,7 +1,7 @@
 //! Linear blend skinning of a block (Eq. 6): the blended matrix B and what it does to the means.
 
 use super::joints::Joints;
-use super::lanes::{LANES, Lanes};
+use super::lanes::{self, LANES, Lanes};
 use skinsplat_core::math::Matrix3;
 
 /// The blended affine map of each lane.
@@ -78,7 +78,7 @@ impl Blend {
     /// B of one lane.
     #[inline(always)]
     pub(super) fn matrix(&self, lane: usize) -> Matrix3<f32> {
-        matrix(&self.linear, lane)
+        lanes::matrix(&self.linear, lane)
     }
 }
 
@@ -99,11 +99,4 @@ fn add(sum: &mut [Lanes; 9], matrix: &Matrix3<f32>, weight: &Lanes) {
             sum[lane] += weight[lane] * entry;
         }
     }
-}
-
-/// One lane of a row-major matrix.
-#[inline(always)]
-pub(super) fn matrix(entries: &[Lanes; 9], lane: usize) -> Matrix3<f32> {
-    let row = |r: usize| [entries[3 * r][lane], entries[3 * r + 1][lane], entries[3 * r + 2][lane]];
-    [row(0), row(1), row(2)]
 }

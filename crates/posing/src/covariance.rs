@@ -57,7 +57,7 @@ pub(super) fn adjoint(
         CovarianceChoice::Rotate | CovarianceChoice::Surfel => {
             for lane in 0..LANES {
                 let q = take(posed, lane);
-                let of_matrix = scaled(&super::blend::matrix(gradient, lane), scales, lane);
+                let of_matrix = scaled(&lanes::matrix(gradient, lane), scales, lane);
                 result.put(lane, q, &of_matrix);
             }
         }
@@ -65,7 +65,7 @@ pub(super) fn adjoint(
             let sign = if choice == CovarianceChoice::Affine { 1.0 } else { -1.0 };
             for lane in 0..LANES {
                 let [w, x, y, z] = take(canonical, lane);
-                let of_product = scaled(&super::blend::matrix(gradient, lane), scales, lane);
+                let of_product = scaled(&lanes::matrix(gradient, lane), scales, lane);
                 let of_own = product(&matrix3::transpose(blend.matrix(lane)), &of_product);
                 result.put(lane, [w, sign * x, sign * y, sign * z], &of_own);
             }

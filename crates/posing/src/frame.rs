@@ -27,7 +27,7 @@ pub(super) struct Frame<'a> {
     pub(super) source: Source<'a>,
     /// That of the only camera that will look, if what it does not see may be left out.
     frustum: Option<Frustum>,
-    arch: pulp::Arch,
+    pub(super) arch: pulp::Arch,
 }
 
 /// What a walk does with each block.

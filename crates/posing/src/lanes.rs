@@ -1,6 +1,6 @@
 //! One number, quaternion or matrix per Gaussian of a block: structures of arrays, so that a loop over lanes is vector code.
 
-use skinsplat_core::math::{Quaternion, rotation};
+use skinsplat_core::math::{Matrix3, Quaternion, rotation};
 
 /// Gaussians per block.
 pub(crate) const LANES: usize = 8;
@@ -51,4 +51,43 @@ pub(crate) fn sum(a: &[Lanes; 4], b: &[Lanes; 4]) -> [Lanes; 4] {
         *sum += b;
     }
     sum
+}
+
+/// One lane of row-major matrices.
+#[inline(always)]
+pub(crate) fn matrix(entries: &[Lanes; 9], lane: usize) -> Matrix3<f32> {
+    let row = |r: usize| [entries[3 * r][lane], entries[3 * r + 1][lane], entries[3 * r + 2][lane]];
+    [row(0), row(1), row(2)]
+}
+
+/// Sets one lane of row-major matrices.
+#[inline(always)]
+pub(crate) fn put_matrix(entries: &mut [Lanes; 9], lane: usize, m: &Matrix3<f32>) {
+    for row in 0..3 {
+        for column in 0..3 {
+            entries[3 * row + column][lane] = m[row][column];
+        }
+    }
+}
+
+/// a b per lane.
+#[inline(always)]
+pub(crate) fn product(a: &[Lanes; 9], b: &[Lanes; 9]) -> [Lanes; 9] {
+    let mut product = [[0.0; LANES]; 9];
+    for row in 0..3 {
+        for column in 0..3 {
+            for lane in 0..LANES {
+                product[3 * row + column][lane] = a[3 * row][lane] * b[column][lane]
+                    + a[3 * row + 1][lane] * b[3 + column][lane]
+                    + a[3 * row + 2][lane] * b[6 + column][lane];
+            }
+        }
+    }
+    product
+}
+
+/// aᵀ per lane.
+#[inline(always)]
+pub(crate) fn transposed(a: &[Lanes; 9]) -> [Lanes; 9] {
+    [a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8]]
 }

@@ -1,21 +1,4 @@
-//! How Gaussians turn with a body: a strategy is three choices, and every strategy answers in [`Posed`].
-//!
-//! For a Gaussian with canonical rotation R_c, scales S, SH s and skinning weights w_j, joints with rotations R_j
-//! relative to the rest pose and their blend B = Σ w_j R_j:
-//!
-//! | axis | choices |
-//! |---|---|
-//! | rotation | [`LbsProjection`] of B, [`FaceFrame`], average of quaternions (per Gaussian or per vertex), sum of quaternions with signs ([`JointLift`]), dual quaternions |
-//! | covariance | R R_c S² R_cᵀ Rᵀ, or affine: B R_c S² R_cᵀ Bᵀ |
-//! | colour | SH left alone; rotated (Eq. 9); view direction read with Bᵀ or Rᵀ |
-//!
-//! The paper's four strategies and the stock methods are [`PRESETS`] over these axes; text like
-//! `quaternion-average+rotation=power-15+colour=none` varies one. A fifth of anything is one enum arm, one row in the
-//! table of ids and one function: `rotate` for rotations, `covariance`, `colour`. The compiler lists the places.
-//!
-//! [`BoundAvatar`] holds what does not depend on the pose; [`pose()`] is the hot path.
-//!
-//! [`Posed`]: skinsplat_core::scene::Posed
+#![doc = include_str!("../README.md")]
 
 mod adjoint;
 mod bake;

@@ -273,8 +273,8 @@ impl Actor<'_> {
     fn pose(&self) -> Pose {
         let axis_angles: Vec<DVec3> = self.rotations.iter().map(|q| q.to_scaled_axis()).collect();
         let mut pose = Pose::from_axis_angles(self.skeleton, &axis_angles, DVec3::ZERO);
-        let rest = self.skeleton.world_transforms(&Pose::rest(self.skeleton));
-        let posed = self.skeleton.world_transforms(&pose);
+        let rest = self.skeleton.world_transforms(&self.skeleton.rest_locals);
+        let posed = self.skeleton.world_transforms(&pose.locals);
         let named = |name: &str| self.skeleton.names.iter().position(|n| n == name);
         let ankles: Vec<usize> = ["left_ankle", "right_ankle"].into_iter().filter_map(named).collect();
         let toes: Vec<usize> = ["left_foot", "right_foot"].into_iter().filter_map(named).collect();

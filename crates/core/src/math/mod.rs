@@ -25,3 +25,9 @@ pub type Matrix3<T> = [[T; 3]; 3];
 pub fn dot4<T: Real>(a: Quaternion<T>, b: Quaternion<T>) -> T {
     (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
 }
+
+/// A gap that can be told from zero in this precision: wider than 16 units in the last place of the largest eigenvalue
+/// (or singular value), about what summing the problem's matrix costs. False for NaN.
+pub fn is_distinct<T: Real>(gap: T, largest: T) -> bool {
+    gap > T::from_f64(16.0) * T::EPSILON * largest
+}

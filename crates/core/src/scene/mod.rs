@@ -7,16 +7,20 @@ pub mod gradient;
 pub mod image;
 pub mod pose;
 pub mod posed;
+pub mod posed_body;
 pub mod rasterizer;
+pub mod skeleton;
 pub mod skin_weights;
 
 pub use avatar::{Avatar, Binding, FaceBinding, Gaussians};
-pub use body::{Body, JointTransform, PosedBody, PosedMesh, RestBody, ShapeSpace, Skeleton, Uv};
+pub use body::{Body, RestBody, ShapeSpace, Uv};
 pub use camera::Camera;
 pub use gradient::{AvatarGradient, PosedGradient, RenderedGradient};
 pub use image::{Image, Mask};
-pub use pose::{LocalTransform, Pose};
+pub use pose::Pose;
 pub use posed::{ColourClamp, OwnedPosed, Posed, Rendered, Underlay};
+pub use posed_body::{JointTransform, PosedBody, PosedMesh};
+pub use skeleton::{LocalTransform, Skeleton};
 pub use skin_weights::SkinWeights;
 
 /// A scene value that breaks an invariant. `field` names the part, `expected` says what it should have been; the data

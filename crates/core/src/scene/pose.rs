@@ -1,29 +1,7 @@
 //! A pose: one local transform per skeleton node, and a translation of the whole body.
 
-use super::Skeleton;
-use glam::{DAffine3, DQuat, DVec3};
-
-/// Translation, rotation and scale of a node relative to its parent, applied in the order scale, rotation, translation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LocalTransform {
-    /// Metres.
-    pub translation: DVec3,
-    /// Unit quaternion.
-    pub rotation: DQuat,
-    /// Factor per axis.
-    pub scale: DVec3,
-}
-
-impl LocalTransform {
-    /// No motion.
-    pub const IDENTITY: Self =
-        Self { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
-
-    /// As an affine map.
-    pub fn to_affine(self) -> DAffine3 {
-        DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
-    }
-}
+use super::{LocalTransform, Skeleton};
+use glam::{DQuat, DVec3};
 
 /// The state of a skeleton in one frame.
 #[derive(Clone, Debug, PartialEq)]

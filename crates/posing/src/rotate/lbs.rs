@@ -1,6 +1,8 @@
 //! The blended matrix B = Σ w_j L_j made a rotation, one Gaussian at a time.
 
-use super::super::lanes::{LANES, Lanes, identity, put, splat, take};
+use super::super::lanes::{
+    LANES, Lanes, identity, matrix, multiply, product, put, put_matrix, splat, take, transposed,
+};
 use super::{BlockInput, Rotated};
 use skinsplat_core::math::{Quaternion, dot4, matrix3, rotation};
 
@@ -59,63 +61,166 @@ pub(super) fn projected(projection: LbsProjection, input: &BlockInput<'_>) -> [L
 
 /// PyTorch3D's quaternion of B R_c, raw or normalised: the posed quaternion itself.
 #[inline(never)]
-pub(super) fn converted(projection: LbsProjection, input: &BlockInput<'_>) -> Rotated {
-    let mut rotated = Rotated { relative: identity(), posed: identity(), means: None };
-    for lane in 0..LANES {
-        let canonical = take(&input.block.rotations, lane);
-        let turned =
-            matrix3::multiply(input.blend.matrix(lane), rotation::quaternion_to_matrix_raw(canonical));
-        let raw = rotation::matrix_to_quaternion_raw(turned);
-        let unit = rotation::normalize(raw).unwrap_or(canonical);
-        put(&mut rotated.relative, lane, rotation::multiply(unit, rotation::conjugate(canonical)));
-        put(
-            &mut rotated.posed,
-            lane,
-            if projection == LbsProjection::MatrixToQuaternionRaw { raw } else { unit },
-        );
+pub(super) fn converted(arch: pulp::Arch, projection: LbsProjection, input: &BlockInput<'_>) -> Rotated {
+    let canonical = &input.block.rotations;
+    let Conversion { raw, mut unit, usual, .. } =
+        arch.dispatch(Convert { blend: &input.blend.linear, canonical });
+    if !usual {
+        for lane in 0..LANES {
+            let own = rotation::normalize(take(&raw, lane));
+            put(&mut unit, lane, own.unwrap_or(take(canonical, lane)));
+        }
     }
-    rotated
+    let mut back = *canonical;
+    back[1..].as_flattened_mut().iter_mut().for_each(|c| *c = -*c);
+    let raw_is_drawn = projection == LbsProjection::MatrixToQuaternionRaw;
+    Rotated { relative: multiply(&unit, &back), posed: if raw_is_drawn { raw } else { unit }, means: None }
 }
+
+/// The conversion of a block.
+struct Conversion {
+    /// B R_c, row-major.
+    turned: [Lanes; 9],
+    /// Its quaternion, not normalised.
+    raw: [Lanes; 4],
+    /// Of unit length, if all are `usual`.
+    unit: [Lanes; 4],
+    /// No squared length leaves the range in which its root and the inverse of that are as good as any.
+    usual: bool,
+}
+
+struct Convert<'a> {
+    blend: &'a [Lanes; 9],
+    canonical: &'a [Lanes; 4],
+}
+
+impl pulp::NullaryFnOnce for Convert<'_> {
+    type Output = Conversion;
+
+    #[inline(always)]
+    fn call(self) -> Conversion {
+        let mut own = [[0.0; LANES]; 9];
+        for lane in 0..LANES {
+            let rotation = rotation::quaternion_to_matrix_raw(take(self.canonical, lane));
+            put_matrix(&mut own, lane, &rotation);
+        }
+        let turned = product(self.blend, &own);
+        let mut raw = [[0.0; LANES]; 4];
+        for lane in 0..LANES {
+            put(&mut raw, lane, rotation::matrix_to_quaternion_raw(matrix(&turned, lane)));
+        }
+        let (mut unit, mut usual) = (raw, 0);
+        for lane in 0..LANES {
+            let squared = dot4(take(&raw, lane), take(&raw, lane));
+            let inverse = 1.0 / squared.sqrt();
+            unit.iter_mut().for_each(|c| c[lane] *= inverse);
+            usual += u32::from((squared > LEAST_SQUARE) & (squared < MOST_SQUARE));
+        }
+        Conversion { turned, raw, unit, usual: usual as usize == LANES }
+    }
+}
+
+/// Squared lengths between which [`rotation::normalize`] multiplies by the inverse root.
+const LEAST_SQUARE: f32 = f32::MIN_POSITIVE / (f32::EPSILON * f32::EPSILON);
+const MOST_SQUARE: f32 = f32::EPSILON / f32::MIN_POSITIVE;
 
 /// [`converted`] walked backwards, through B R_c. See [`super::rotation_adjoint`].
 #[inline(never)]
 pub(super) fn converted_adjoint(
+    arch: pulp::Arch,
     projection: LbsProjection,
     input: &BlockInput<'_>,
     rotated: &Rotated,
     posed: &[Lanes; 4],
     torque: Option<&[Lanes; 3]>,
 ) -> [Lanes; 4] {
+    let raw_is_drawn = projection == LbsProjection::MatrixToQuaternionRaw;
+    if torque.is_none() {
+        let convert = Convert { blend: &input.blend.linear, canonical: &input.block.rotations };
+        if let Some(result) = arch.dispatch(ConvertAdjoint { convert, raw_is_drawn, posed }) {
+            return result;
+        }
+    }
     let mut result = [[0.0; LANES]; 4];
     for lane in 0..LANES {
-        let (canonical, of_posed) = (take(&input.block.rotations, lane), take(posed, lane));
-        let b = input.blend.matrix(lane);
-        let turned = matrix3::multiply(b, rotation::quaternion_to_matrix_raw(canonical));
-        let raw = rotation::matrix_to_quaternion_raw(turned);
-        let Some(unit) = rotation::normalize(raw) else {
-            put(&mut result, lane, of_posed);
-            continue;
-        };
-        let of_length = |of_unit| rotation::adjoint::normalize(unit, 1.0 / dot4(unit, raw), of_unit);
-        let raw_is_drawn = projection == LbsProjection::MatrixToQuaternionRaw;
-        let mut of_raw = if raw_is_drawn { of_posed } else { of_length(of_posed) };
-        let mut of_canonical = [0.0; 4];
-        if let Some(torque) = torque {
-            // R = unit ⊗ R_c⁻¹: rotating R_c on rotates R back, seen from where R starts.
-            let torque = [0, 1, 2].map(|axis: usize| torque[axis][lane]);
-            let relative = rotation::conjugate(take(&rotated.relative, lane));
-            let back = matrix3::apply(rotation::quaternion_to_matrix_raw(relative), torque).map(|t| -t);
-            of_raw = sum(of_raw, of_length(rotation::adjoint::from_torque(unit, torque)));
-            of_canonical = rotation::adjoint::from_torque(canonical, back);
-        }
-        let of_turned = rotation::adjoint::matrix_to_quaternion_raw(turned, of_raw);
-        let of_own = matrix3::multiply(matrix3::transpose(b), of_turned);
-        let through_turned = rotation::adjoint::quaternion_to_matrix_raw(canonical, &of_own);
-        put(&mut result, lane, sum(of_canonical, through_turned));
+        let torque = torque.map(|torque| [0, 1, 2].map(|axis: usize| torque[axis][lane]));
+        put(&mut result, lane, lane_adjoint(raw_is_drawn, input, rotated, take(posed, lane), torque, lane));
     }
     result
 }
 
+/// All lanes at once, without a torque; `None` if a lane needs care.
+struct ConvertAdjoint<'a> {
+    convert: Convert<'a>,
+    raw_is_drawn: bool,
+    posed: &'a [Lanes; 4],
+}
+
+impl pulp::NullaryFnOnce for ConvertAdjoint<'_> {
+    type Output = Option<[Lanes; 4]>;
+
+    #[inline(always)]
+    fn call(self) -> Option<[Lanes; 4]> {
+        let Convert { blend, canonical } = self.convert;
+        let Conversion { turned, raw, unit, usual } = Convert { blend, canonical }.call();
+        if !usual {
+            return None;
+        }
+        let mut of_raw = *self.posed;
+        if !self.raw_is_drawn {
+            for lane in 0..LANES {
+                let (unit, raw) = (take(&unit, lane), take(&raw, lane));
+                let of_unit = take(self.posed, lane);
+                put(&mut of_raw, lane, rotation::adjoint::normalize(unit, 1.0 / dot4(unit, raw), of_unit));
+            }
+        }
+        let mut of_turned = [[0.0; LANES]; 9];
+        for lane in 0..LANES {
+            let (turned, of_raw) = (matrix(&turned, lane), take(&of_raw, lane));
+            let of_lane = rotation::adjoint::matrix_to_quaternion_raw(turned, of_raw);
+            put_matrix(&mut of_turned, lane, &of_lane);
+        }
+        let of_own = product(&transposed(blend), &of_turned);
+        let mut result = [[0.0; LANES]; 4];
+        for lane in 0..LANES {
+            let own = matrix(&of_own, lane);
+            let of_canonical = rotation::adjoint::quaternion_to_matrix_raw(take(canonical, lane), &own);
+            put(&mut result, lane, sum([0.0; 4], of_canonical));
+        }
+        Some(result)
+    }
+}
+
+/// One lane, whatever it holds.
+fn lane_adjoint(
+    raw_is_drawn: bool,
+    input: &BlockInput<'_>,
+    rotated: &Rotated,
+    of_posed: Quaternion<f32>,
+    torque: Option<[f32; 3]>,
+    lane: usize,
+) -> Quaternion<f32> {
+    let canonical = take(&input.block.rotations, lane);
+    let b = input.blend.matrix(lane);
+    let turned = matrix3::multiply(b, rotation::quaternion_to_matrix_raw(canonical));
+    let raw = rotation::matrix_to_quaternion_raw(turned);
+    let Some(unit) = rotation::normalize(raw) else { return of_posed };
+    let of_length = |of_unit| rotation::adjoint::normalize(unit, 1.0 / dot4(unit, raw), of_unit);
+    let mut of_raw = if raw_is_drawn { of_posed } else { of_length(of_posed) };
+    let mut of_canonical = [0.0; 4];
+    if let Some(torque) = torque {
+        // R = unit ⊗ R_c⁻¹: rotating R_c on rotates R back, seen from where R starts.
+        let relative = rotation::conjugate(take(&rotated.relative, lane));
+        let back = matrix3::apply(rotation::quaternion_to_matrix_raw(relative), torque).map(|t| -t);
+        of_raw = sum(of_raw, of_length(rotation::adjoint::from_torque(unit, torque)));
+        of_canonical = rotation::adjoint::from_torque(canonical, back);
+    }
+    let of_turned = rotation::adjoint::matrix_to_quaternion_raw(turned, of_raw);
+    let of_own = matrix3::multiply(matrix3::transpose(b), of_turned);
+    sum(of_canonical, rotation::adjoint::quaternion_to_matrix_raw(canonical, &of_own))
+}
+
+#[inline(always)]
 fn sum(a: Quaternion<f32>, b: Quaternion<f32>) -> Quaternion<f32> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }

@@ -5,12 +5,14 @@
 
 mod average;
 mod block;
+mod dispatch;
 mod dual;
 mod faces;
 mod lbs;
 mod lifted;
 
-pub(crate) use block::{BlockInput, Rotated, means_adjoint, rotate, rotation_adjoint};
+pub(crate) use block::{BlockInput, Rotated};
+pub(crate) use dispatch::{means_adjoint, rotate, rotation_adjoint};
 pub use lbs::LbsProjection;
 
 use super::face_frame::FaceFrame;

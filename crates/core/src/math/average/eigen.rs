@@ -1,6 +1,6 @@
 //! Eigenvalues and eigenvectors of a symmetric 4x4 matrix, and the rule for ties.
 
-use super::super::{Quaternion, Real, dot4, rotation};
+use super::super::{Quaternion, Real, dot4, is_distinct, rotation};
 
 /// A symmetric 4x4 matrix, decomposed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,8 +92,7 @@ pub fn nearest_in_top_space<T: Real>(
     scale: T,
     references: impl Iterator<Item = (Quaternion<T>, T)>,
 ) -> Quaternion<T> {
-    let dimension =
-        (1..4).find(|&i| rotation::is_distinct(eigen.values[0] - eigen.values[i], scale)).unwrap_or(4);
+    let dimension = (1..4).find(|&i| is_distinct(eigen.values[0] - eigen.values[i], scale)).unwrap_or(4);
     let mut best = None;
     let mut best_weight = T::ZERO;
     for (reference, weight) in references {

@@ -23,8 +23,8 @@ pub use power::power_iterate;
 pub use solver::{ParseSolverError, Solver, Start};
 pub use two_bones::two_bones;
 
-use super::rotation::{self, SignPolicy, is_distinct};
-use super::{Matrix3, Quaternion, Real, dot4};
+use super::rotation::{self, SignPolicy};
+use super::{Matrix3, Quaternion, Real, dot4, is_distinct};
 use eigen::SymmetricEigen;
 use squaring::Symmetric;
 use std::marker::PhantomData;

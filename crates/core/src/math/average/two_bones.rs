@@ -1,6 +1,7 @@
 //! The average of two rotations in closed form.
 
-use super::super::rotation::{is_distinct, normalize};
+use super::super::is_distinct;
+use super::super::rotation::normalize;
 use super::super::{Quaternion, Real, dot4};
 
 /// `(κ, c, ρ, sign)` of two unit quaternions p, q: κ = (u − v) / (u + v), c = |p·q|, ρ = gap of the eigenvalues of

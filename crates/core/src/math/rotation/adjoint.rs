@@ -2,7 +2,7 @@
 //! respect to what it was given (transposed Jacobians).
 
 use super::super::{Matrix3, Quaternion, Real, dot4};
-use super::convert::{four_outer_product, leading};
+use super::convert::{Leading, four_outer_product, leading};
 
 /// Of [`quaternion_to_matrix_raw`](super::quaternion_to_matrix_raw) at `q`; each component of `q` by itself.
 #[inline(always)]
@@ -21,22 +21,26 @@ pub fn quaternion_to_matrix_raw<T: Real>([w, x, y, z]: Quaternion<T>, g: &Matrix
 
 /// Of [`matrix_to_quaternion_raw`](super::matrix_to_quaternion_raw) at `m`, on the branch that `m` takes; each entry of
 /// `m` by itself. The four diagonal terms that choose the branch sum to 4, so the divisor's floor never acts.
-#[inline]
+#[inline(always)]
 pub fn matrix_to_quaternion_raw<T: Real>(m: Matrix3<T>, g: Quaternion<T>) -> Matrix3<T> {
-    let outer = four_outer_product(m);
-    let (best, magnitude) = leading(&outer);
-    let half = T::ONE / (T::from_f64(2.0) * magnitude);
+    let Leading { row: outer, own, best } = leading(&four_outer_product(m));
+    let (half, squared) = (T::ONE / (T::from_f64(2.0) * own), own * own);
+    let of_best = |row: [T; 4]| match best {
+        [true, ..] => row[0],
+        [_, true, ..] => row[1],
+        [_, _, true, _] => row[2],
+        _ => row[3],
+    };
     // p_best = √s / 2 and p_j = o_j / (2 √s) with s on the diagonal and o_j beside it.
-    let along = (dot4(g, outer[best]) - g[best] * outer[best][best]) * half;
-    let mut row = g.map(|c| c * half);
-    row[best] = T::from_f64(0.5) * (g[best] * half - along / (magnitude * magnitude));
+    let along = (dot4(g, outer) - of_best(g) * of_best(outer)) * half;
+    let of_own = T::from_f64(0.5) * (of_best(g) * half - along / squared);
+    let row = [0, 1, 2, 3].map(|k: usize| if best[k] { of_own } else { g[k] * half });
     // Row `best` of a symmetric matrix: whichever of a pair it is, it is the same entry of m.
-    let mut of_outer = [[T::ZERO; 4]; 4];
-    of_outer[best] = row;
-    let of = |i: usize, j: usize| of_outer[i][j] + of_outer[j][i];
+    let at = |i: usize, j: usize| if best[i] { row[j] } else { T::ZERO };
+    let of = |i: usize, j: usize| at(i, j) + at(j, i);
     let (wx, wy, wz) = (of(0, 1), of(0, 2), of(0, 3));
     let (xy, xz, yz) = (of(1, 2), of(1, 3), of(2, 3));
-    let diagonal = |axis: usize| if best == 0 || best == axis { row[best] } else { -row[best] };
+    let diagonal = |axis: usize| if best[0] | best[axis] { of_own } else { -of_own };
     [[diagonal(1), xy - wz, xz + wy], [xy + wz, diagonal(2), yz - wx], [xz - wy, yz + wx, diagonal(3)]]
 }
 
@@ -108,13 +112,13 @@ mod tests {
         for seed in 0..400 {
             let m: [f64; 9] = std::array::from_fn(|k| wave(seed, k));
             let outer = four_outer_product(rows(m));
-            let (best, magnitude) = leading(&outer);
-            let next = (0..4).filter(|&i| i != best).map(|i| outer[i][i]).fold(0.0, f64::max);
-            assert!(magnitude >= 1.0);
-            if magnitude * magnitude - next < 1e-3 {
+            let Leading { own, best, .. } = leading(&outer);
+            let next = (0..4).filter(|&i| !best[i]).map(|i| outer[i][i]).fold(0.0, f64::max);
+            assert!(own >= 1.0);
+            if own * own - next < 1e-3 {
                 continue;
             }
-            branches[best] += 1;
+            branches.iter_mut().zip(best).for_each(|(count, best)| *count += i32::from(best));
             let g = [0, 1, 2, 3].map(|k| wave(seed, 20 + k));
             let found = flat(matrix_to_quaternion_raw(rows(m), g));
             assert_derivative(m, g, found, |m| rotation::matrix_to_quaternion_raw(rows(m)));

@@ -54,26 +54,41 @@ pub(super) fn four_outer_product<T: Real>(m: Matrix3<T>) -> [[T; 4]; 4] {
 /// Not normalised and without a rule for the sign: the component that chose the candidate is non-negative.
 ///
 /// On a blend B = Σ w R of rotations (Σ w = 1) this is A e_i / √A_ii with A = Σ w q qᵀ: one un-normalised power step.
+#[inline(always)]
 pub fn matrix_to_quaternion_raw<T: Real>(m: Matrix3<T>) -> Quaternion<T> {
-    let outer = four_outer_product(m);
-    let (best, magnitude) = leading(&outer);
-    let divisor = T::from_f64(2.0) * magnitude.max(T::from_f64(0.1));
-    let mut candidate = outer[best];
-    candidate[best] = magnitude * magnitude;
-    candidate.map(|c| c / divisor)
+    let Leading { mut row, own, best } = leading(&four_outer_product(m));
+    for k in 0..4 {
+        row[k] = if best[k] { own * own } else { row[k] };
+    }
+    let divisor = T::from_f64(2.0) * own.max(T::from_f64(0.1));
+    [row[0] / divisor, row[1] / divisor, row[2] / divisor, row[3] / divisor]
 }
 
-/// The candidate with the largest component of its own (the first of equals), and twice that component.
-#[inline]
-pub(super) fn leading<T: Real>(outer: &[[T; 4]; 4]) -> (usize, T) {
-    let magnitudes = [outer[0][0], outer[1][1], outer[2][2], outer[3][3]].map(|s| s.max(T::ZERO).sqrt());
-    let mut best = 0;
+/// The candidate with the largest component of its own (the first of equals).
+pub(super) struct Leading<T> {
+    /// Its row of [`four_outer_product`].
+    pub(super) row: [T; 4],
+    /// Twice its own component.
+    pub(super) own: T,
+    /// True for its own component alone.
+    pub(super) best: [bool; 4],
+}
+
+/// Chosen without branches or indices that depend on the data, so that a loop over matrices is vector code.
+#[inline(always)]
+pub(super) fn leading<T: Real>(outer: &[[T; 4]; 4]) -> Leading<T> {
+    let component = |i: usize| outer[i][i].max(T::ZERO).sqrt();
+    let mut leading = Leading { row: outer[0], own: component(0), best: [true, false, false, false] };
     for i in 1..4 {
-        if magnitudes[i] > magnitudes[best] {
-            best = i;
+        let own = component(i);
+        let larger = own > leading.own;
+        for k in 0..4 {
+            leading.row[k] = if larger { outer[i][k] } else { leading.row[k] };
+            leading.best[k] = if larger { i == k } else { leading.best[k] };
         }
+        leading.own = if larger { own } else { leading.own };
     }
-    (best, magnitudes[best])
+    leading
 }
 
 /// The unit quaternion of a rotation matrix, w ≥ 0 ([`SignPolicy::NonNegativeW`]). Accurate for every angle. A matrix

@@ -11,7 +11,7 @@ pub use convert::{
 pub use projection::{
     gram_schmidt_columns, gram_schmidt_rows, nearest_rotation, polar, unique_nearest_rotation,
 };
-pub use projection::{is_distinct, proper_polar_factor, unique_polar_of_rounded};
+pub use projection::{proper_polar_factor, unique_polar_of_rounded};
 
 use super::{Quaternion, Real, dot4};
 

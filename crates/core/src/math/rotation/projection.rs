@@ -36,12 +36,6 @@ pub fn gram_schmidt_rows<T: Real>(m: Matrix3<T>) -> Option<Matrix3<T>> {
     Some([first, second, matrix3::cross(first, second)])
 }
 
-/// A gap that can be told from zero in this precision: wider than 16 units in the last place of the largest eigenvalue
-/// (or singular value), about what summing the problem's matrix costs. False for NaN.
-pub fn is_distinct<T: Real>(gap: T, largest: T) -> bool {
-    gap > T::from_f64(16.0) * T::EPSILON * largest
-}
-
 /// Davenport's matrix K of a blend B of rotations of total weight W: K = 4 A − W I with A = Σ w q qᵀ. Its largest
 /// eigenvector is the rotation nearest to B.
 fn davenport<T: Real>(m: Matrix3<T>) -> [[T; 4]; 4] {

@@ -1,0 +1,79 @@
+//! A block of Gaussians, rotated by whatever a strategy reads, and the way back.
+
+use super::super::lanes::{LANES, Lanes, identity, multiply, put, take};
+use super::block::{BlockInput, Rotated};
+use super::{LbsProjection, Source, average, dual, lbs};
+use skinsplat_core::math::rotation;
+
+/// Rotates a block.
+#[inline(always)]
+pub(crate) fn rotate(arch: pulp::Arch, source: &Source<'_>, input: &BlockInput<'_>) -> Rotated {
+    let (indices, weights) = input.chunk.influences(input.block);
+    if indices.is_empty() {
+        return Rotated { relative: identity(), posed: input.block.rotations, means: None };
+    }
+    let mut means = None;
+    let relative = match source {
+        Source::Lbs(
+            projection @ (LbsProjection::MatrixToQuaternionRaw | LbsProjection::MatrixToQuaternion),
+        ) => {
+            return lbs::converted(arch, *projection, input);
+        }
+        Source::Identity => identity(),
+        Source::Lbs(projection) => lbs::projected(*projection, input),
+        Source::Average(solver) => {
+            average::average(arch, input.joints, indices, weights, input.blend, *solver)
+        }
+        Source::Dual => {
+            let motions = dual::blend(input.joints, indices, weights);
+            means = Some(motions.transform(&input.block.means));
+            motions.real
+        }
+        Source::Faces(faces) => faces.of_block(input),
+        Source::PerBlock(rotations) => rotations(input),
+    };
+    let posed = multiply(&relative, &input.block.rotations);
+    Rotated { relative, posed, means }
+}
+
+/// The derivatives with respect to the canonical quaternions (to first order on the unit sphere) from those with respect
+/// to [`Rotated::posed`]. `torque`, with respect to a further rotation of [`Rotated::relative`], is read only where R
+/// depends on R_c.
+#[inline(always)]
+pub(crate) fn rotation_adjoint(
+    arch: pulp::Arch,
+    source: &Source<'_>,
+    input: &BlockInput<'_>,
+    rotated: &Rotated,
+    posed: &[Lanes; 4],
+    torque: Option<&[Lanes; 3]>,
+) -> [Lanes; 4] {
+    match source {
+        Source::Lbs(projection) if projection.converts() && !input.block.influences.is_empty() => {
+            lbs::converted_adjoint(arch, *projection, input, rotated, posed, torque)
+        }
+        _ => {
+            let mut canonical = [[0.0; LANES]; 4];
+            for lane in 0..LANES {
+                let back = rotation::conjugate(take(&rotated.relative, lane));
+                put(&mut canonical, lane, rotation::multiply(back, take(posed, lane)));
+            }
+            canonical
+        }
+    }
+}
+
+/// The derivatives with respect to the canonical means where [`Rotated::means`] takes the place of Eq. 6: Rᵀ g.
+#[inline(always)]
+pub(crate) fn means_adjoint(rotated: &Rotated, gradient: &[Lanes; 3]) -> [Lanes; 3] {
+    let mut means = [[0.0; LANES]; 3];
+    for lane in 0..LANES {
+        let back = rotation::quaternion_to_matrix_raw(rotation::conjugate(take(&rotated.relative, lane)));
+        for axis in 0..3 {
+            means[axis][lane] = back[axis][0] * gradient[0][lane]
+                + back[axis][1] * gradient[1][lane]
+                + back[axis][2] * gradient[2][lane];
+        }
+    }
+    means
+}
