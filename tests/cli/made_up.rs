@@ -1,8 +1,7 @@
 //! A small body, an avatar bound to it, poses and a camera, each of which a test may break.
 
 use crate::program::Desk;
-use npyz::WriterBuilder;
-use npyz::npz::NpzWriter;
+use crate::files::{self, Values};
 use std::path::{Path, PathBuf};
 
 /// An array of an archive: name, shape, values (written as f32).
@@ -45,13 +44,9 @@ pub(super) fn without(mut fields: Vec<Field>, name: &str) -> Vec<Field> {
 }
 
 pub(super) fn write_npz(path: &Path, fields: &[Field]) -> PathBuf {
-    let mut archive = NpzWriter::create(path).unwrap();
-    for (name, shape, values) in fields {
-        let mut writer =
-            archive.array(name, Default::default()).unwrap().default_dtype().shape(shape).begin_nd().unwrap();
-        writer.extend(values.iter().copied()).unwrap();
-        writer.finish().unwrap();
-    }
+    let arrays: Vec<_> =
+        fields.iter().map(|(name, shape, values)| (*name, shape.as_slice(), Values::F32(values.clone()))).collect();
+    files::npz(path, &arrays);
     path.to_owned()
 }
 

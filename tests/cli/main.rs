@@ -1,6 +1,8 @@
 //! The program from outside: every subcommand, every exit code, every kind of bad input.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+#[path = "../support/files.rs"]
+mod files;
 #[path = "../support/program.rs"]
 mod program;
 #[path = "../support/mod.rs"]

@@ -2,7 +2,6 @@
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses a part of this module")]
 
 use npyz::WriterBuilder;
-use npyz::npz::NpzWriter;
 use std::io::Write;
 use std::path::Path;
 
@@ -16,23 +15,28 @@ pub enum Values {
 
 /// Writes an `.npz` archive of C-order arrays.
 pub fn npz(path: &Path, arrays: &[(&str, &[u64], Values)]) {
-    let mut archive = NpzWriter::create(path).unwrap();
+    let mut archive = zip::ZipWriter::new(std::fs::File::create(path).unwrap());
     for (name, shape, values) in arrays {
-        macro_rules! write {
-            ($values:expr) => {{
-                let builder = archive.array(name, Default::default()).unwrap().default_dtype().shape(shape);
-                let mut writer = builder.begin_nd().unwrap();
-                writer.extend($values).unwrap();
-                writer.finish().unwrap();
-            }};
-        }
-        match values {
-            Values::F32(v) => write!(v),
-            Values::F64(v) => write!(v),
-            Values::U32(v) => write!(v),
-            Values::I64(v) => write!(v),
-        }
+        archive.start_file(format!("{name}.npy"), zip::write::SimpleFileOptions::default()).unwrap();
+        let bytes = match values {
+            Values::F32(v) => npy(shape, v),
+            Values::F64(v) => npy(shape, v),
+            Values::U32(v) => npy(shape, v),
+            Values::I64(v) => npy(shape, v),
+        };
+        archive.write_all(&bytes).unwrap();
     }
+    archive.finish().unwrap();
+}
+
+/// The bytes of an `.npy` file.
+fn npy<T: npyz::AutoSerialize + Clone>(shape: &[u64], values: &[T]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut writer =
+        npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut bytes).begin_nd().unwrap();
+    writer.extend(values.iter().cloned()).unwrap();
+    writer.finish().unwrap();
+    bytes
 }
 
 /// An SMPL-style body of two joints (at the origin and at x = 1), four vertices, two faces and one shape direction.
