@@ -142,7 +142,7 @@ fn a_sequence_may_keep_everything_in_its_json() {
     let from_json = Subject::load(&copied, &options).unwrap();
     let original = Subject::load(&subject("snapshot_ava"), &Options::default()).unwrap();
     for (a, b) in from_json.sequences().zip(original.sequences()) {
-        assert_eq!((&a.cameras, &a.body, &a.poses), (&b.cameras, &b.body, &b.poses));
+        assert_eq!((&*a.cameras, &a.body, &*a.poses), (&*b.cameras, &b.body, &*b.poses));
     }
 }
 

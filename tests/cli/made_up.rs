@@ -1,7 +1,7 @@
 //! A small body, an avatar bound to it, poses and a camera, each of which a test may break.
 
-use crate::program::Desk;
 use crate::files::{self, Values};
+use crate::program::Desk;
 use std::path::{Path, PathBuf};
 
 /// An array of an archive: name, shape, values (written as f32).
@@ -44,8 +44,10 @@ pub(super) fn without(mut fields: Vec<Field>, name: &str) -> Vec<Field> {
 }
 
 pub(super) fn write_npz(path: &Path, fields: &[Field]) -> PathBuf {
-    let arrays: Vec<_> =
-        fields.iter().map(|(name, shape, values)| (*name, shape.as_slice(), Values::F32(values.clone()))).collect();
+    let arrays: Vec<_> = fields
+        .iter()
+        .map(|(name, shape, values)| (*name, shape.as_slice(), Values::F32(values.clone())))
+        .collect();
     files::npz(path, &arrays);
     path.to_owned()
 }

@@ -8,7 +8,8 @@ use skinsplat_core::scene::{
     Avatar, Binding, Camera, Gaussians, Pose, PosedBody, RestBody, SceneError, Skeleton, SkinWeights,
 };
 use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
-use skinsplat_render::splat::{RenderSettings, Renderer};
+use skinsplat_render::View;
+use skinsplat_render::splat::Renderer;
 use std::error::Error;
 use std::fmt::Write as _;
 
@@ -51,14 +52,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let posed_body = PosedBody::new(&body, &Pose::from_axis_angles(&body.skeleton, &bend, DVec3::ZERO))?;
     let side = SIDE as u32;
     let camera = Camera::look_at(DVec3::new(0.0, 0.6, 3.0), DVec3::Y * 0.3, DVec3::Y, 170.0, side, side);
-    let settings = RenderSettings { background: [1.0; 3], antialiased: false };
+    let view = View::new(&camera).over([1.0; 3]);
     let options = PoseOptions { seen_by: Some(&camera), ..PoseOptions::default() };
     let (mut poser, mut renderer) = (Poser::new(), Renderer::new());
     let mut panels = Vec::new();
     for spec in ["lbs", "quaternion-average"] {
         let strategy: Strategy = spec.parse()?;
         let posed = poser.pose(&bound, &posed_body, &strategy, &options)?;
-        let image = renderer.render(&posed, &camera, &settings).image;
+        let image = renderer.render(&posed, &view)?.image.clone();
         let sum = image.pixels().iter().fold(Vec3::ZERO, |sum, &rgb| sum + Vec3::from_array(rgb));
         println!("{spec}: {} Gaussians, mean colour {:.4}", posed.len(), sum / (SIDE * SIDE) as f32);
         panels.push(image);

@@ -15,7 +15,7 @@ use skinsplat_core::math::{Quaternion, rotation};
 use skinsplat_core::scene::{AvatarGradient, Gaussians, OwnedPosed, Posed, PosedBody, PosedGradient};
 
 /// Poses avatars, and owns the memory of the last pose: at 100,000 Gaussians fresh memory costs as much as the work.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Poser {
     arch: pulp::Arch,
     means: Vec<Vec3>,
@@ -25,16 +25,22 @@ pub struct Poser {
     sh: Vec<[f32; 3]>,
 }
 
+impl Default for Poser {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Poser {
-    /// One without memory yet, for the processor that it runs on.
+    /// One without memory yet, for the vector instructions of [`skinsplat_simd::arch`].
     pub fn new() -> Self {
-        Self::default()
+        Self::on(skinsplat_simd::arch())
     }
 
     /// With the instructions of one kind of processor.
-    #[cfg(test)]
     fn on(arch: pulp::Arch) -> Self {
-        Self { arch, ..Self::default() }
+        let (means, factors, rotations, view_frames, sh) = Default::default();
+        Self { arch, means, factors, rotations, view_frames, sh }
     }
 
     /// Poses an avatar.
@@ -334,7 +340,7 @@ mod tests {
         let body = PosedBody::new(&body, &at).unwrap();
         for preset in PRESETS {
             let (strategy, options) = (&preset.strategy, PoseOptions::default());
-            let mut posers = [pulp::Arch::Scalar, pulp::Arch::new()].map(Poser::on);
+            let mut posers = [pulp::Arch::Scalar, skinsplat_simd::arch()].map(Poser::on);
             let narrow = posers[0].pose(&bound, &body, strategy, &options).unwrap().into_owned();
             assert_eq!(narrow, pose(&bound, &body, strategy).unwrap(), "{}", preset.id);
 

@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn the_whole_chain_pulls_as_finite_differences_of_the_exact_one() {
         let (points, faces) = pentagon();
-        let blur = Blur::new(1.0);
+        let blur = Blur::new(1.0, 3.0);
         let shifted: Vec<DVec2> = points.iter().map(|&p| p + DVec2::new(0.8, -0.5)).collect();
         let filtered = |points: &[DVec2]| {
             let mut coverage = exact(points, &[]);
