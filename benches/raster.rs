@@ -17,10 +17,9 @@ mod splat_scene;
 
 use criterion::Criterion;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use skinsplat_core::scene::{
-    Camera, Gaussians, Image, OwnedPosed, Posed, PosedGradient, Rendered, RenderedGradient,
-};
-use skinsplat_render::splat::{Derivatives, Phase, PhaseTimes, RenderSettings, Renderer, SimdLevel};
+use skinsplat_core::scene::{Camera, Gaussians, Image, OwnedPosed, Posed, PosedGradient, RenderedGradient};
+use skinsplat_render::View;
+use skinsplat_render::splat::{Derivatives, Phase, Renderer, SimdLevel, render};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -46,11 +45,12 @@ fn main() {
         let Some(gaussians) = (!views.is_empty()).then(|| gaussians(scene)).flatten() else { continue };
         let posed = OwnedPosed::from_static(&gaussians);
         let posed = posed.as_posed();
-        for (view, camera, settings) in views {
+        for (name, camera, background) in views {
             for threads in [1, 2] {
-                let frame = Frame { level, posed: &posed, camera, settings };
+                let view = View::new(camera).over(*background);
+                let frame = Frame { level, posed: &posed, view };
                 let line = pool(threads).install(|| frame.measure());
-                println!("{scene:5} {view:12} {threads:6} {line}");
+                println!("{scene:5} {name:12} {threads:6} {line}");
             }
         }
     }
@@ -59,27 +59,26 @@ fn main() {
     }
 }
 
-fn criterion(cameras: &[(String, Camera, RenderSettings)]) {
+fn criterion(cameras: &[(String, Camera, [f32; 3])]) {
     let mut criterion = Criterion::default().sample_size(30).configure_from_args();
-    for (scene, view) in [("S", "front_512"), ("M", "front_1024")] {
+    for (scene, at) in [("S", "front_512"), ("M", "front_1024")] {
         let Some(gaussians) = gaussians(scene) else { continue };
         let posed = OwnedPosed::from_static(&gaussians);
         let posed = posed.as_posed();
-        let (_, camera, settings) = cameras.iter().find(|(name, ..)| name == view).unwrap();
+        let (_, camera, background) = cameras.iter().find(|(name, ..)| name == at).unwrap();
         let mut renderer = Renderer::new();
-        let mut rendered = renderer.render(&posed, camera, settings);
+        let view = View::new(camera).over(*background);
         let pool = pool(2);
-        criterion.bench_function(&format!("render/{scene}/{view}/2 threads"), |b| {
-            b.iter(|| pool.install(|| renderer.render_into(&posed, camera, settings, &mut rendered)));
+        criterion.bench_function(&format!("render/{scene}/{at}/2 threads"), |b| {
+            b.iter(|| pool.install(|| renderer.render(&posed, &view).is_ok()));
         });
         let upstream = upstream(camera);
         let mut gradient = PosedGradient::default();
-        criterion.bench_function(&format!("render and adjoint/{scene}/{view}/2 threads"), |b| {
+        criterion.bench_function(&format!("render and adjoint/{scene}/{at}/2 threads"), |b| {
             b.iter(|| {
                 pool.install(|| {
-                    renderer.render_into(&posed, camera, settings, &mut rendered);
-                    let exact = Derivatives::Exact;
-                    renderer.backward(&posed, camera, settings, &rendered, &upstream, exact, &mut gradient);
+                    renderer.render(&posed, &view).unwrap();
+                    renderer.backward(&posed, &view, &upstream, &mut gradient, Derivatives::Exact).unwrap();
                 });
             });
         });
@@ -90,29 +89,29 @@ fn criterion(cameras: &[(String, Camera, RenderSettings)]) {
 struct Frame<'a> {
     level: Option<SimdLevel>,
     posed: &'a Posed<'a>,
-    camera: &'a Camera,
-    settings: &'a RenderSettings,
+    view: View<'a>,
 }
 
 impl Frame<'_> {
     /// One line of the table.
     fn measure(&self) -> String {
         let mut renderer = self.level.map_or_else(Renderer::new, |l| Renderer::with_simd_level(l).unwrap());
-        let mut rendered: Rendered = renderer.render(self.posed, self.camera, self.settings);
-        let reused = least(|| renderer.render_into(self.posed, self.camera, self.settings, &mut rendered));
-        let fresh = least(|| drop(renderer.render(self.posed, self.camera, self.settings)));
-        let upstream = upstream(self.camera);
+        let (posed, view) = (self.posed, self.view);
+        let reused = least(|| {
+            renderer.render(posed, &view).unwrap();
+        });
+        let fresh = least(|| drop(render(posed, &view).unwrap()));
+        let upstream = upstream(view.camera);
         let mut gradient = PosedGradient::default();
         let back = least(|| {
-            let (posed, camera, settings) = (self.posed, self.camera, self.settings);
-            renderer.render_into(posed, camera, settings, &mut rendered);
-            let exact = Derivatives::Exact;
-            renderer.backward(posed, camera, settings, &rendered, &upstream, exact, &mut gradient);
+            renderer.render(posed, &view).unwrap();
+            renderer.backward(posed, &view, &upstream, &mut gradient, Derivatives::Exact).unwrap();
         });
         let mut phases = [f64::INFINITY; PHASES.len()];
+        renderer.profile(true);
         least(|| {
-            let times: PhaseTimes =
-                renderer.render_profiled(self.posed, self.camera, self.settings, &mut rendered);
+            renderer.render(posed, &view).unwrap();
+            let times = renderer.phase_times();
             for (least, phase) in phases.iter_mut().zip(PHASES) {
                 *least = least.min(times.of(phase).as_secs_f64() * 1e3);
             }
@@ -157,7 +156,7 @@ fn gaussians(scene: &str) -> Option<Gaussians> {
     None
 }
 
-fn cameras() -> Vec<(String, Camera, RenderSettings)> {
+fn cameras() -> Vec<(String, Camera, [f32; 3])> {
     let path = Path::new(FOLDER).join("cameras.json");
     let Ok(text) = std::fs::read_to_string(&path) else {
         println!("{} is missing: python3 benches/gen_raster_scenes.py {FOLDER} S M", path.display());
@@ -166,7 +165,7 @@ fn cameras() -> Vec<(String, Camera, RenderSettings)> {
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
     let view = |json: &serde_json::Value| {
         let (camera, background) = splat_scene::camera(json);
-        (json["name"].as_str().unwrap().to_owned(), camera, RenderSettings { background, antialiased: false })
+        (json["name"].as_str().unwrap().to_owned(), camera, background)
     };
     json["cameras"].as_array().unwrap().iter().map(view).collect()
 }

@@ -85,7 +85,10 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return answered(&error),
     };
-    let result = set_threads(cli.threads).and_then(|()| cli.command.run(Context { quiet: cli.quiet }));
+    let result = skinsplat_simd::level()
+        .map_err(anyhow::Error::from)
+        .and_then(|_| set_threads(cli.threads))
+        .and_then(|()| cli.command.run(Context { quiet: cli.quiet }));
     match result {
         Ok(exit) => exit.into(),
         Err(error) if output::is_broken_pipe(&error) => Exit::Success.into(),

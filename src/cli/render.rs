@@ -4,7 +4,7 @@ use super::posing::Posing;
 use super::{Context, Exit, selection::parse_colour};
 use anyhow::{Result, bail};
 use skinsplat_data::{camera, frames};
-use skinsplat_render::splat::{self, RenderSettings};
+use skinsplat_render::{View, splat};
 use std::path::PathBuf;
 
 /// Render a 3DGS PLY, posed or as it stands.
@@ -47,10 +47,10 @@ impl Render {
             bail!("{}: --out; expected a name that ends in .png or .npy", self.out.display());
         }
         let background = self.background.or(view.background).unwrap_or([0.0; 3]);
-        let settings = RenderSettings { background, antialiased: self.antialiased };
         let subject = self.posing.load(&self.file)?;
         let rendered = subject.posed(&self.posing.strategy(), Some(&view.camera), |posed| {
-            Ok(splat::render(posed, &view.camera, &settings))
+            let view = View::new(&view.camera).over(background).antialiased(self.antialiased);
+            Ok(splat::render(posed, &view)?)
         })?;
         match extension.as_str() {
             "png" => frames::save_png(&self.out, &rendered.image)?,

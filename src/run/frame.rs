@@ -3,13 +3,14 @@
 use super::Error;
 use super::avatars::Prepared;
 use crate::experiment::{Job, JobVariant, Seconds};
-use skinsplat_core::scene::{Camera, Image, Mask, Pose, Posed, PosedBody, Rendered};
+use skinsplat_core::scene::{Camera, Image, Pose, Posed, PosedBody};
 use skinsplat_data::{Sequence, Truth};
 use skinsplat_fit::texture::{SAMPLES, TexturedBody};
 use skinsplat_metrics::Protocol;
 use skinsplat_posing::{PoseOptions, Poser, Strategy};
+use skinsplat_render::View;
 use skinsplat_render::mesh::SamplePattern;
-use skinsplat_render::splat::{RenderSettings, Renderer};
+use skinsplat_render::splat::Renderer;
 use std::time::Instant;
 
 /// A frame, loaded.
@@ -55,11 +56,11 @@ impl<'a> Frame<'a> {
         let options = PoseOptions { seen_by: Some(self.camera), ..PoseOptions::default() };
         let posed = poser.pose(bound, &self.body, &strategy, &options)?;
         seconds.pose = start.elapsed().as_secs_f64();
-        let settings = RenderSettings { background, antialiased: job.antialiased };
+        let view = View::new(self.camera).over(background).antialiased(job.antialiased);
         let start = Instant::now();
         let image = match mesh {
-            None => renderer.render(&posed, self.camera, &settings).image,
-            Some(mesh) => together(renderer, &posed, (mesh, self.pose), self.camera, &settings)?.image,
+            None => renderer.render(&posed, &view)?.image.clone(),
+            Some(mesh) => together(renderer, &posed, (mesh, self.pose), view)?,
         };
         seconds.render = start.elapsed().as_secs_f64();
         let (splats, visible) = (posed.len() as u64, renderer.visible() as u64);
@@ -72,15 +73,10 @@ pub(super) fn together(
     renderer: &mut Renderer,
     posed: &Posed<'_>,
     (mesh, pose): (&TexturedBody, &Pose),
-    camera: &Camera,
-    settings: &RenderSettings,
-) -> Result<Rendered, Error> {
-    let drawing = mesh.drawing(pose, camera, SamplePattern::new(SAMPLES))?;
-    let empty = || Mask::filled(1, 1, 0.0);
-    let mut rendered = Rendered { image: Image::filled(1, 1, [0.0; 3]), alpha: empty(), depth: empty() };
-    let mut shown = empty();
-    renderer.render_over(posed, camera, settings, &drawing.underlay(), &mut rendered, &mut shown);
-    Ok(rendered)
+    view: View<'_>,
+) -> Result<Image, Error> {
+    let drawing = mesh.drawing(pose, view.camera, SamplePattern::new(SAMPLES))?;
+    Ok(renderer.render(posed, &view.with_underlay(Some(drawing.underlay())))?.image.clone())
 }
 
 /// What a variant looks like.

@@ -10,7 +10,8 @@ use skinsplat_fit::texture::TexturedBody;
 use skinsplat_fit::train::Fitted;
 use skinsplat_metrics::{Protocol, Wanted};
 use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
-use skinsplat_render::splat::{RenderSettings, Renderer};
+use skinsplat_render::View;
+use skinsplat_render::splat::Renderer;
 use std::sync::Arc;
 
 /// Poses, renders and scores an avatar on every frame of some sequences, by the default protocol. Binding it costs more than
@@ -57,7 +58,6 @@ fn of_sequence(
 ) -> Result<HeldOut, Error> {
     let protocol = Protocol::parse("default")?;
     let background = protocol.background_colour().unwrap_or([1.0; 3]);
-    let settings = RenderSettings { background, antialiased: false };
     let read = bound.joints_read(strategy);
     let score = |renderer: &mut Renderer, index: usize| {
         let truth = sequence.truth(index)?;
@@ -67,9 +67,10 @@ fn of_sequence(
         let mut poser = Poser::new();
         let options = PoseOptions { seen_by: Some(camera), ..PoseOptions::default() };
         let posed = poser.pose(bound, &body, strategy, &options)?;
+        let view = View::new(camera).over(background);
         let image = match mesh {
-            None => renderer.render(&posed, camera, &settings).image,
-            Some(mesh) => together(renderer, &posed, (mesh, pose), camera, &settings)?.image,
+            None => renderer.render(&posed, &view)?.image.clone(),
+            Some(mesh) => together(renderer, &posed, (mesh, pose), view)?,
         };
         let truth = skinsplat_metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha };
         Ok(protocol.score_with(&image, truth, Wanted { ssim: asked.ssim, lpips: None })?)

@@ -3,6 +3,7 @@
 
 use glam::{DMat3, DMat4, DVec3, Mat3, Quat, Vec3};
 use skinsplat_core::scene::{Camera, ColourClamp, OwnedPosed};
+use skinsplat_render::View;
 
 /// SplitMix64.
 pub struct Random(pub u64);
@@ -35,6 +36,24 @@ impl Random {
     pub fn rotation(&mut self) -> Quat {
         let [x, y, z, w] = std::array::from_fn(|_| self.between(-1.0, 1.0) as f32);
         Quat::from_xyzw(x, y, z, w + 0.1).normalize()
+    }
+}
+
+/// What a view has besides its camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    pub background: [f32; 3],
+    pub antialiased: bool,
+}
+
+impl Settings {
+    pub fn random(random: &mut Random) -> Self {
+        let background = std::array::from_fn(|_| random.unit() as f32);
+        Self { background, antialiased: random.below(2) == 0 }
+    }
+
+    pub fn view(self, camera: &Camera) -> View<'_> {
+        View::new(camera).over(self.background).antialiased(self.antialiased)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::npy::{self, Array};
 use super::{Error, atomic, error};
-use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
-use skinsplat_core::scene::{Image, Mask, SceneError, camera::MAX_IMAGE_SIDE};
+use image::{DynamicImage, ImageDecoder, ImageReader};
+use skinsplat_core::scene::{Image, Mask, SceneError, camera};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -139,13 +139,12 @@ impl Channels {
 
 fn decode(path: &Path, bytes: &[u8]) -> Result<Channels, Error> {
     let broken = |cause: &dyn std::fmt::Display| Error::invalid(path, "image", cause.to_string(), IMAGE);
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| broken(&e))?;
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_IMAGE_SIDE);
-    limits.max_image_height = Some(MAX_IMAGE_SIDE);
-    reader.limits(limits);
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| broken(&e))?;
     let mut decoder = reader.into_decoder().map_err(|e| broken(&e))?;
     let (width, height) = decoder.dimensions();
+    camera::check_image_size(width, height).map_err(|refused| {
+        Error::invalid(path, "image", format!("{}: {}", refused.field, refused.problem), refused.expected)
+    })?;
     if decoder.total_bytes() > (bytes.len() as u64).saturating_mul(MAX_EXPANSION) {
         let problem = format!("{width}x{height} pixels in {} bytes", bytes.len());
         return Err(Error::invalid(path, "image size", problem, "a size that the file can hold"));

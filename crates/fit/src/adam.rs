@@ -57,7 +57,7 @@ impl Adam {
         let moments = self.first.par_chunks_mut(length).zip(self.second.par_chunks_mut(length));
         let values = parameters.par_chunks_mut(length).zip(gradient.par_chunks(length));
         moments.zip(values).for_each(|((first, second), (parameters, gradient))| {
-            pulp::Arch::new().dispatch(Update {
+            skinsplat_simd::arch().dispatch(Update {
                 beta1,
                 beta2,
                 epsilon,

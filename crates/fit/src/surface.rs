@@ -18,7 +18,8 @@ use skinsplat_core::scene::{
 };
 use skinsplat_data::sequence::Sequence;
 use skinsplat_posing::{BoundAvatar, Strategy, pose};
-use skinsplat_render::splat::{RenderSettings, render};
+use skinsplat_render::View;
+use skinsplat_render::splat::render;
 
 /// How a surface-initialised avatar is made. The defaults gave the best PSNR on held-out frames.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -171,16 +172,16 @@ fn refine(
 ) -> Result<(), Error> {
     let strategy = Strategy::preset(REFINEMENT_STRATEGY)
         .ok_or_else(|| Error::invalid("strategy", REFINEMENT_STRATEGY, "a preset"))?;
-    let settings = RenderSettings { background: REFINEMENT_BACKGROUND, antialiased: false };
     for _ in 0..init.refinements {
         let avatar = layout.avatar(init, colours, &sequence.body);
         let bound = BoundAvatar::new(&avatar, &sequence.body).map_err(Error::strategy(sequence))?;
         let residual = |frame: &Frame<'_>| {
             let posed = pose(&bound, &frame.body, &strategy).map_err(Error::strategy(sequence))?;
-            let mut image = render(&posed.as_posed(), frame.camera, &settings).image;
+            let view = View::new(frame.camera).over(REFINEMENT_BACKGROUND);
+            let mut image = render(&posed.as_posed(), &view).map_err(Error::scene(sequence))?.image;
             let truth = &frame.truth;
             let truth =
-                truth.rgb.composited(&truth.alpha, settings.background).map_err(Error::scene(sequence))?;
+                truth.rgb.composited(&truth.alpha, REFINEMENT_BACKGROUND).map_err(Error::scene(sequence))?;
             for (pixel, wanted) in image.pixels_mut().iter_mut().zip(truth.pixels()) {
                 *pixel = std::array::from_fn(|c| wanted[c] - pixel[c]);
             }

@@ -10,7 +10,8 @@ use skinsplat_fit::texture::{TextureInit, gather_texture};
 use skinsplat_fit::{Error, clothing};
 use skinsplat_posing::{BoundAvatar, Strategy, pose};
 use skinsplat_render::mesh::{Fragment, Mesh, SamplePattern, draw};
-use skinsplat_render::splat::{RenderSettings, render};
+use skinsplat_render::View;
+use skinsplat_render::splat::render;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -153,7 +154,7 @@ fn drawn(avatar: &Avatar, test: &Sequence, camera: &Camera) -> Image {
     let body = PosedBody::new(&test.body, &test.poses[0]).unwrap();
     let strategy = Strategy::preset("quaternion-average").unwrap();
     let posed = pose(&bound, &body, &strategy).unwrap();
-    render(&posed, camera, &RenderSettings { background: [1.0; 3], ..Default::default() }).image
+    render(&posed, &View::new(camera).over([1.0; 3])).unwrap().image
 }
 
 fn avatar_psnr(train: &Sequence, test: &Sequence, init: &SurfaceInit) -> f64 {

@@ -52,7 +52,8 @@ struct Best {
 
 impl Best {
     fn none(slack: f64) -> Self {
-        let point = SurfacePoint { face: u32::MAX, barycentric: [1.0, 0.0, 0.0] };
+        // Stands where no distance is a number.
+        let point = SurfacePoint { face: 0, barycentric: [1.0, 0.0, 0.0] };
         Self { distance: f64::INFINITY, point, limit: f64::INFINITY, slack }
     }
 
@@ -263,6 +264,14 @@ mod tests {
                 proptest::prop_assert_eq!(tree.nearest(point, None), best);
                 proptest::prop_assert_eq!(tree.nearest(point, Some(guess)), best);
             }
+        }
+    }
+
+    #[test]
+    fn coordinates_that_overflow_still_name_a_face() {
+        let far = body(vec![DVec3::X * 1e160, DVec3::Y * 1e300, DVec3::splat(-1e200)], vec![[0, 1, 2]]);
+        for point in [DVec3::ZERO, DVec3::splat(1e170), DVec3::splat(f64::NAN)] {
+            assert_eq!(NearestFace::new(&far).unwrap().nearest(point, None).face, 0);
         }
     }
 

@@ -334,7 +334,7 @@ mod tests {
         let body = PosedBody::new(&body, &at).unwrap();
         for preset in PRESETS {
             let (strategy, options) = (&preset.strategy, PoseOptions::default());
-            let mut posers = [pulp::Arch::Scalar, pulp::Arch::new()].map(Poser::on);
+            let mut posers = [pulp::Arch::Scalar, skinsplat_simd::arch()].map(Poser::on);
             let narrow = posers[0].pose(&bound, &body, strategy, &options).unwrap().into_owned();
             assert_eq!(narrow, pose(&bound, &body, strategy).unwrap(), "{}", preset.id);
 

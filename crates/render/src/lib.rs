@@ -1,8 +1,11 @@
-//! From geometry and a camera to an image: [`splat`] draws Gaussians, [`mesh`] draws triangles. [`definition`] is the oracle.
+#![doc = include_str!("../README.md")]
 
 pub mod definition;
 pub mod mesh;
 pub mod splat;
+mod view;
+
+pub use view::View;
 
 /// Version of this code as part of content keys. Raise it by hand, with a line in CHANGELOG.md, whenever a change moves
 /// numbers by more than rounding: whoever stored results under the old version computes them anew.

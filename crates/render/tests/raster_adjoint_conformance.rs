@@ -10,7 +10,8 @@ mod support;
 use glam::{Mat3, Quat, Vec3, Vec4};
 use skinsplat_core::scene::{Gaussians, Image, OwnedPosed, PosedGradient, RenderedGradient};
 use skinsplat_data::npz::Archive;
-use skinsplat_render::splat::{Derivatives, RenderSettings, Renderer, SimdLevel};
+use skinsplat_render::View;
+use skinsplat_render::splat::{Derivatives, Renderer, SimdLevel};
 use support::{fixture, json};
 
 fn array(archive: &str, name: &str) -> Vec<f32> {
@@ -60,26 +61,18 @@ fn scene_s_has_the_derivatives_of_the_original_kernels() {
     let (camera, background) = splat_scene::camera(&json("raster/front_512.json"));
     let gaussians = splat_scene::gaussians(&fixture("raster/scene_S.ply"));
     let posed = OwnedPosed::from_static(&gaussians);
-    let settings = RenderSettings { background, antialiased: false };
+    let view = View::new(&camera).over(background);
     // The upstream that the kernels were given, less the pixels that nothing was drawn to.
     let upstream = array("raster/S_front_512_dl_dimage.npz", "dl_dimage");
     let upstream = upstream.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
     let upstream = RenderedGradient { image: Image::new(512, 512, upstream).unwrap(), alpha: None };
     let mut gradients = Vec::new();
-    for level in [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512] {
+    for level in SimdLevel::ALL {
         let Some(mut renderer) = Renderer::with_simd_level(level) else { continue };
-        let rendered = renderer.render(&posed.as_posed(), &camera, &settings);
+        renderer.render(&posed.as_posed(), &view).unwrap();
         let mut gradient = PosedGradient::default();
         let original = Derivatives::OriginalKernels;
-        renderer.backward(
-            &posed.as_posed(),
-            &camera,
-            &settings,
-            &rendered,
-            &upstream,
-            original,
-            &mut gradient,
-        );
+        renderer.backward(&posed.as_posed(), &view, &upstream, &mut gradient, original).unwrap();
         gradients.push(gradient);
     }
     assert!(gradients.windows(2).all(|pair| pair[0] == pair[1]), "every vector width gives the same bits");

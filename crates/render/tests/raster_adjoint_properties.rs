@@ -10,16 +10,18 @@ mod random_scene;
 use differences::{assert_close, assert_gradient, difference};
 use glam::{Mat3, Vec3};
 use proptest::prelude::*;
-use random_scene::{Random, camera, chosen, posed};
+use random_scene::{Random, Settings, camera, chosen, posed};
 use skinsplat_core::scene::{Camera, ColourClamp, Image, Mask, OwnedPosed, PosedGradient, RenderedGradient};
+use skinsplat_render::View;
 use skinsplat_render::definition as reference_splatting;
-use skinsplat_render::splat::{Derivatives, RenderSettings, Renderer, SimdLevel};
+use skinsplat_render::definition::Blended;
+use skinsplat_render::splat::{Derivatives, Renderer, SimdLevel};
 
 /// Everything that a loss needs, from a seed.
 struct Scene {
     posed: OwnedPosed,
     camera: Camera,
-    settings: RenderSettings,
+    settings: Settings,
     upstream: RenderedGradient,
 }
 
@@ -28,8 +30,7 @@ impl Scene {
         let mut random = Random(seed);
         let posed = posed(&mut random, count);
         let camera = camera(&mut random, width, height);
-        let background = std::array::from_fn(|_| random.unit() as f32);
-        let settings = RenderSettings { background, antialiased: random.below(2) == 0 };
+        let settings = Settings::random(&mut random);
         let (w, h) = (width as usize, height as usize);
         let mut value = || random.between(-1.0, 1.0) as f32;
         let image = (0..w * h).map(|_| [value(), value(), value()]).collect();
@@ -39,19 +40,15 @@ impl Scene {
         Self { posed, camera, settings, upstream }
     }
 
+    fn view(&self) -> View<'_> {
+        self.settings.view(&self.camera)
+    }
+
     fn gradient(&self, renderer: &mut Renderer, derivatives: Derivatives) -> PosedGradient {
-        let Self { posed, camera, settings, upstream } = self;
-        let rendered = renderer.render(&posed.as_posed(), camera, settings);
-        let mut gradient = PosedGradient::default();
-        renderer.backward(
-            &posed.as_posed(),
-            camera,
-            settings,
-            &rendered,
-            upstream,
-            derivatives,
-            &mut gradient,
-        );
+        let Self { posed, upstream, .. } = self;
+        let (view, mut gradient) = (self.view(), PosedGradient::default());
+        renderer.render(&posed.as_posed(), &view).unwrap();
+        renderer.backward(&posed.as_posed(), &view, upstream, &mut gradient, derivatives).unwrap();
         gradient
     }
 
@@ -60,8 +57,9 @@ impl Scene {
     }
 
     /// The loss in f64 whose derivatives by pixel are `upstream`.
-    fn loss(&self, posed: &OwnedPosed, camera: &Camera, chosen: &[Vec<usize>]) -> f64 {
-        let pixels = reference_splatting::render_chosen(&posed.as_posed(), camera, &self.settings, chosen);
+    fn loss(&self, posed: &OwnedPosed, camera: &Camera, chosen: &[Vec<Blended>]) -> f64 {
+        let view = self.settings.view(camera);
+        let pixels = reference_splatting::render_selected(&posed.as_posed(), &view, chosen).unwrap();
         let of = |i: usize, pixel: [f64; 5]| {
             let colour = self.upstream.image.pixels()[i];
             let alpha = self.upstream.alpha.as_ref().map_or(0.0, |alpha| alpha.values()[i]);
@@ -70,8 +68,8 @@ impl Scene {
         pixels.into_iter().enumerate().map(|(i, pixel)| of(i, pixel)).sum()
     }
 
-    fn chosen(&self) -> Vec<Vec<usize>> {
-        reference_splatting::chosen(&self.posed.as_posed(), &self.camera, &self.settings)
+    fn chosen(&self) -> Vec<Vec<Blended>> {
+        reference_splatting::selected(&self.posed.as_posed(), &self.view()).unwrap()
     }
 }
 
@@ -123,14 +121,20 @@ fn long_lists_have_the_derivatives_of_the_definition() {
     let gradient = scene.gradient(&mut renderer, Derivatives::Exact);
     assert!(renderer.visible() > 2 * 4096, "{} splats", renderer.visible());
     let chosen = scene.chosen();
-    let mut drawn: Vec<usize> = chosen.iter().flatten().copied().collect();
+    let gaussian = |blended: &Blended| match *blended {
+        Blended::Gaussian(i) => Some(i),
+        Blended::Underlay => None,
+    };
+    let mut drawn: Vec<usize> = chosen.iter().flatten().filter_map(gaussian).collect();
     drawn.sort_unstable();
     drawn.dedup();
     let some: Vec<usize> = drawn.into_iter().step_by(400).collect();
     assert!(some.len() > 10);
     let loss = |p: &OwnedPosed| scene.loss(p, &scene.camera, &chosen);
-    let expected: Vec<f64> =
-        some.iter().map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i])).collect();
+    let expected: Vec<f64> = some
+        .iter()
+        .map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i]))
+        .collect();
     let found: Vec<f32> = some.iter().map(|&i| gradient.opacities[i]).collect();
     assert_close("opacities", &found, &expected, 1e-5);
 }
@@ -149,7 +153,7 @@ proptest! {
             let one = with_threads(1);
             prop_assert_eq!(&with_threads(2), &one);
             prop_assert_eq!(&with_threads(5), &one);
-            for level in [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512] {
+            for level in SimdLevel::ALL {
                 if let Some(mut renderer) = Renderer::with_simd_level(level) {
                     prop_assert_eq!(&scene.gradient(&mut renderer, derivatives), &one);
                 }
@@ -204,10 +208,9 @@ fn nothing_carries_over_from_frame_to_frame() {
     for (seed, count, width, height) in [(7, 700, 300, 90), (8, 3, 17, 16), (9, 2000, 64, 64), (10, 0, 1, 5)]
     {
         let scene = Scene::new(seed, count, width, height);
-        let Scene { posed, camera, settings, upstream } = &scene;
-        let rendered = renderer.render(&posed.as_posed(), camera, settings);
-        let exact = Derivatives::Exact;
-        renderer.backward(&posed.as_posed(), camera, settings, &rendered, upstream, exact, &mut gradient);
+        let (posed, view) = (&scene.posed, scene.view());
+        renderer.render(&posed.as_posed(), &view).unwrap();
+        renderer.backward(&posed.as_posed(), &view, &scene.upstream, &mut gradient, Derivatives::Exact).unwrap();
         assert_eq!(gradient, scene.exact());
     }
 }
@@ -234,7 +237,7 @@ fn single(opacity: f32) -> Scene {
         camera_from_world: glam::DMat4::IDENTITY,
     };
     let upstream = RenderedGradient { image: Image::filled(1, 1, [1.0, 0.0, 0.0]), alpha: None };
-    Scene { posed, camera, settings: RenderSettings::default(), upstream }
+    Scene { posed, camera, settings: Settings { background: [0.0; 3], antialiased: false }, upstream }
 }
 
 #[test]
@@ -304,11 +307,16 @@ fn the_original_kernels_differentiate_the_antialiasing_factor_at_the_low_passed_
 }
 
 #[test]
-#[should_panic(expected = "backward must follow")]
 fn a_frame_that_was_not_drawn_is_refused() {
-    let scene = single(0.5);
-    let rendered = Renderer::new().render(&scene.posed.as_posed(), &scene.camera, &scene.settings);
-    let (exact, mut gradient) = (Derivatives::Exact, PosedGradient::default());
-    let Scene { posed, camera, settings, upstream } = &scene;
-    Renderer::new().backward(&posed.as_posed(), camera, settings, &rendered, upstream, exact, &mut gradient);
+    let mut scene = single(0.5);
+    let backward = |renderer: &mut Renderer, scene: &Scene| {
+        let (exact, mut gradient) = (Derivatives::Exact, PosedGradient::default());
+        renderer.backward(&scene.posed.as_posed(), &scene.view(), &scene.upstream, &mut gradient, exact)
+    };
+    let mut renderer = Renderer::new();
+    assert_eq!(backward(&mut renderer, &scene).unwrap_err().field, "frame");
+    renderer.render(&scene.posed.as_posed(), &scene.view()).unwrap();
+    backward(&mut renderer, &scene).unwrap();
+    scene.upstream.image = Image::filled(2, 1, [0.0; 3]);
+    assert_eq!(backward(&mut renderer, &scene).unwrap_err().field, "gradient of the image");
 }

@@ -9,7 +9,8 @@ mod support;
 use glam::{DMat4, Quat, Vec3};
 use serde_json::Value;
 use skinsplat_core::scene::{Camera, Gaussians, OwnedPosed};
-use skinsplat_render::splat::{RenderSettings, Renderer, SimdLevel};
+use skinsplat_render::View;
+use skinsplat_render::splat::{Renderer, SimdLevel, render};
 use support::{fixture, json};
 
 /// p99.9 and maximum of the absolute difference.
@@ -37,11 +38,11 @@ fn scene_s_is_the_image_of_the_original_kernels() {
     let (camera, background) = splat_scene::camera(&json("raster/front_512.json"));
     let gaussians = splat_scene::gaussians(&fixture("raster/scene_S.ply"));
     let posed = OwnedPosed::from_static(&gaussians);
-    let settings = RenderSettings { background, antialiased: false };
+    let view = View::new(&camera).over(background);
     let mut images = Vec::new();
-    for level in [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512] {
+    for level in SimdLevel::ALL {
         let Some(mut renderer) = Renderer::with_simd_level(level) else { continue };
-        let rendered = renderer.render(&posed.as_posed(), &camera, &settings);
+        let rendered = renderer.render(&posed.as_posed(), &view).unwrap().clone();
         assert_same_image(&format!("{level:?}"), rendered.image.pixels().as_flattened(), &golden);
         images.push(rendered);
     }
@@ -92,11 +93,7 @@ fn tiny_render_has_the_reference_colours_and_transmittance_with_the_tile_cull() 
         camera_from_world: DMat4::from_cols_slice(&view).transpose(),
     };
     let background = numbers(&case["background"]).try_into().unwrap();
-    let rendered = Renderer::new().render(
-        &posed.as_posed(),
-        &camera,
-        &RenderSettings { background, antialiased: false },
-    );
+    let rendered = render(&posed.as_posed(), &View::new(&camera).over(background)).unwrap();
     let found = rendered.image.pixels().as_flattened();
     assert_same_image("colour", found, &numbers(&case["image_hwc_tilecull"]));
     let transmittance: Vec<f32> = rendered.alpha.values().iter().map(|alpha| 1.0 - alpha).collect();

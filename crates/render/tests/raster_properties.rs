@@ -6,23 +6,19 @@ mod random_scene;
 
 use glam::{Mat3, Vec3};
 use proptest::prelude::*;
-use random_scene::{Random, camera, chosen, posed};
+use random_scene::{Random, Settings, camera, chosen, posed};
 use skinsplat_core::scene::{Camera, OwnedPosed, Rendered};
+use skinsplat_render::View;
 use skinsplat_render::definition as reference_splatting;
-use skinsplat_render::splat::{RenderSettings, Renderer, SimdLevel, render};
-
-fn settings(random: &mut Random) -> RenderSettings {
-    let background = std::array::from_fn(|_| random.unit() as f32);
-    RenderSettings { background, antialiased: random.below(2) == 0 }
-}
+use skinsplat_render::splat::{Renderer, SimdLevel, render};
 
 /// A scene of up to `most` Gaussians, a camera and settings, all from a seed.
-fn scene(seed: u64, most: usize, width: u32, height: u32) -> (OwnedPosed, Camera, RenderSettings) {
+fn scene(seed: u64, most: usize, width: u32, height: u32) -> (OwnedPosed, Camera, Settings) {
     let mut random = Random(seed);
     let count = random.below(most + 1);
     let posed = posed(&mut random, count);
     let camera = camera(&mut random, width, height);
-    let settings = settings(&mut random);
+    let settings = Settings::random(&mut random);
     (posed, camera, settings)
 }
 
@@ -32,9 +28,9 @@ fn channels(rendered: &Rendered) -> Vec<[f32; 5]> {
     pixels.map(|((&[r, g, b], &alpha), &depth)| [r, g, b, alpha, depth]).collect()
 }
 
-fn with_threads(threads: usize, posed: &OwnedPosed, camera: &Camera, settings: &RenderSettings) -> Rendered {
+fn with_threads(threads: usize, posed: &OwnedPosed, view: &View) -> Rendered {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| render(&posed.as_posed(), camera, settings))
+    pool.install(|| render(&posed.as_posed(), view)).unwrap()
 }
 
 /// One Gaussian in front of a camera at the origin that looks along z.
@@ -71,8 +67,8 @@ proptest! {
     #[test]
     fn images_are_those_of_the_definition(seed: u64, width in 1_u32..70, height in 1_u32..70) {
         let (posed, camera, settings) = scene(seed, 60, width, height);
-        let found = channels(&render(&posed.as_posed(), &camera, &settings));
-        let expected = reference_splatting::render(&posed.as_posed(), &camera, &settings);
+        let found = channels(&render(&posed.as_posed(), &settings.view(&camera)).unwrap());
+        let expected = reference_splatting::render(&posed.as_posed(), &settings.view(&camera)).unwrap();
         let mut errors: Vec<f64> = std::iter::zip(&found, &expected)
             .flat_map(|(a, b)| (0..5).map(|c| (f64::from(a[c]) - b[c]).abs() / [1.0, 1.0, 1.0, 1.0, 10.0][c]))
             .collect();
@@ -85,12 +81,12 @@ proptest! {
     #[test]
     fn threads_and_vector_widths_do_not_change_a_bit(seed: u64, width in 1_u32..600, height in 1_u32..70) {
         let (posed, camera, settings) = scene(seed, 900, width, height);
-        let one = with_threads(1, &posed, &camera, &settings);
-        prop_assert_eq!(&with_threads(2, &posed, &camera, &settings), &one);
-        prop_assert_eq!(&with_threads(5, &posed, &camera, &settings), &one);
-        for level in [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512] {
+        let one = with_threads(1, &posed, &settings.view(&camera));
+        prop_assert_eq!(&with_threads(2, &posed, &settings.view(&camera)), &one);
+        prop_assert_eq!(&with_threads(5, &posed, &settings.view(&camera)), &one);
+        for level in SimdLevel::ALL {
             if let Some(mut renderer) = Renderer::with_simd_level(level) {
-                prop_assert_eq!(&renderer.render(&posed.as_posed(), &camera, &settings), &one);
+                prop_assert_eq!(renderer.render(&posed.as_posed(), &settings.view(&camera)).unwrap(), &one);
             }
         }
     }
@@ -102,14 +98,14 @@ proptest! {
         let mut order: Vec<usize> = (0..posed.len()).collect();
         let mut random = Random(seed ^ 1);
         (1..order.len()).for_each(|i| order.swap(i, random.below(i + 1)));
-        prop_assert_eq!(render(&chosen(&posed, &order).as_posed(), &camera, &settings), render(&posed.as_posed(), &camera, &settings));
+        prop_assert_eq!(render(&chosen(&posed, &order).as_posed(), &settings.view(&camera)).unwrap(), render(&posed.as_posed(), &settings.view(&camera)).unwrap());
     }
 
     #[test]
     fn the_background_enters_by_the_transmittance_left(seed: u64) {
         let (posed, camera, settings) = scene(seed, 80, 40, 30);
-        let over = render(&posed.as_posed(), &camera, &settings);
-        let black = render(&posed.as_posed(), &camera, &RenderSettings { background: [0.0; 3], ..settings });
+        let over = render(&posed.as_posed(), &settings.view(&camera)).unwrap();
+        let black = render(&posed.as_posed(), &settings.view(&camera).over([0.0; 3])).unwrap();
         prop_assert_eq!((&over.alpha, &over.depth), (&black.alpha, &black.depth));
         for (a, b) in std::iter::zip(channels(&over), channels(&black)) {
             prop_assert!((0.0..=1.0).contains(&a[3]));
@@ -144,9 +140,9 @@ proptest! {
             },
         }
         let others: Vec<usize> = (0..posed.len()).filter(|&i| i != victim).collect();
-        let found = render(&posed.as_posed(), &camera, &settings);
+        let found = render(&posed.as_posed(), &settings.view(&camera)).unwrap();
         prop_assert!(channels(&found).as_flattened().iter().all(|v| v.is_finite()));
-        prop_assert_eq!(found, render(&chosen(&posed, &others).as_posed(), &camera, &settings));
+        prop_assert_eq!(found, render(&chosen(&posed, &others).as_posed(), &settings.view(&camera)).unwrap());
     }
 }
 
@@ -174,7 +170,7 @@ proptest! {
             }
         }
         let camera = camera(&mut random, 40, 30);
-        let rendered = render(&posed.as_posed(), &camera, &settings(&mut random));
+        let rendered = render(&posed.as_posed(), &Settings::random(&mut random).view(&camera)).unwrap();
         for pixel in channels(&rendered) {
             prop_assert!(pixel[..3].iter().all(|v| v.is_finite()), "{pixel:?}");
             prop_assert!((0.0..=1.0).contains(&pixel[3]) && pixel[4].is_finite(), "{pixel:?}");
@@ -188,7 +184,7 @@ fn nothing_in_view_leaves_the_background() {
     let mut behind = chosen(&all, &(0..all.len()).collect::<Vec<_>>());
     behind.means.iter_mut().for_each(|mean| *mean = (camera.position() * 2.0).as_vec3());
     for posed in [chosen(&all, &[]), behind] {
-        let rendered = render(&posed.as_posed(), &camera, &settings);
+        let rendered = render(&posed.as_posed(), &settings.view(&camera)).unwrap();
         assert!(rendered.image.pixels().iter().all(|&p| p == settings.background));
         assert!(rendered.alpha.values().iter().chain(rendered.depth.values()).all(|&v| v == 0.0));
     }
@@ -202,16 +198,15 @@ fn equal_depths_are_drawn_in_index_order() {
     posed.opacities.push(0.8);
     posed.sh.push([-1.0, 0.0, 2.0]);
     let camera = forward_camera(9, 9);
-    let first = render(&posed.as_posed(), &camera, &RenderSettings::default()).image.at(4, 4);
-    let swapped =
-        render(&chosen(&posed, &[1, 0]).as_posed(), &camera, &RenderSettings::default()).image.at(4, 4);
+    let first = render(&posed.as_posed(), &View::new(&camera)).unwrap().image.at(4, 4);
+    let swapped = render(&chosen(&posed, &[1, 0]).as_posed(), &View::new(&camera)).unwrap().image.at(4, 4);
     assert!(first[0] > swapped[0] + 0.2 && first[2] < swapped[2] - 0.2, "{first:?} {swapped:?}");
 }
 
 #[test]
 fn a_single_pixel_has_the_alpha_of_the_peak() {
     let posed = single(Vec3::new(0.0, 0.0, 2.0), Mat3::IDENTITY * 0.5, 0.6);
-    let rendered = render(&posed.as_posed(), &forward_camera(1, 1), &RenderSettings::default());
+    let rendered = render(&posed.as_posed(), &View::new(&forward_camera(1, 1))).unwrap();
     assert!((rendered.alpha.at(0, 0) - 0.6).abs() < 1e-6);
     assert!((rendered.depth.at(0, 0) - 1.2).abs() < 2e-6);
 }
@@ -220,12 +215,12 @@ fn a_single_pixel_has_the_alpha_of_the_peak() {
 fn a_splat_larger_than_the_image_covers_all_of_it() {
     for scale in [1e2, 1e4, 1e6] {
         let posed = single(Vec3::new(0.0, 0.0, 2.0), Mat3::IDENTITY * scale, 0.5);
-        let rendered = render(&posed.as_posed(), &forward_camera(300, 50), &RenderSettings::default());
+        let rendered = render(&posed.as_posed(), &View::new(&forward_camera(300, 50))).unwrap();
         assert!(rendered.alpha.values().iter().all(|a| (a - 0.5).abs() < 1e-3), "scale {scale}");
     }
     // Beyond f32: dropped, not drawn as garbage.
     let posed = single(Vec3::new(0.0, 0.0, 2.0), Mat3::IDENTITY * 1e18, 0.5);
-    let rendered = render(&posed.as_posed(), &forward_camera(30, 50), &RenderSettings::default());
+    let rendered = render(&posed.as_posed(), &View::new(&forward_camera(30, 50))).unwrap();
     assert!(rendered.alpha.values().iter().all(|&a| a == 0.0));
 }
 
@@ -234,7 +229,7 @@ fn a_million_splats_in_one_tile_blend_as_their_product() {
     let count = 1_000_000;
     let one = single(Vec3::new(0.0, 0.0, 2.0), Mat3::IDENTITY * 10.0, 0.005);
     let posed = chosen(&one, &vec![0; count]);
-    let rendered = render(&posed.as_posed(), &forward_camera(16, 16), &RenderSettings::default());
+    let rendered = render(&posed.as_posed(), &View::new(&forward_camera(16, 16))).unwrap();
     // Until 0.995^n falls below 1e-4.
     let blended = (1e-4_f64.ln() / 0.995_f64.ln()).floor();
     let expected = 1.0 - 0.995_f64.powf(blended);
@@ -244,12 +239,10 @@ fn a_million_splats_in_one_tile_blend_as_their_product() {
 #[test]
 fn a_renderer_carries_nothing_over_from_frame_to_frame() {
     let mut renderer = Renderer::new();
-    let mut target =
-        render(&scene(1, 10, 3, 3).0.as_posed(), &forward_camera(3, 3), &RenderSettings::default());
     for (seed, most, width, height) in [(7, 700, 300, 90), (8, 3, 17, 16), (9, 2000, 64, 64), (10, 0, 1, 5)] {
         let (posed, camera, settings) = scene(seed, most, width, height);
-        renderer.render_into(&posed.as_posed(), &camera, &settings, &mut target);
-        assert_eq!(target, render(&posed.as_posed(), &camera, &settings));
+        let view = settings.view(&camera);
+        assert_eq!(renderer.render(&posed.as_posed(), &view).unwrap(), &render(&posed.as_posed(), &view).unwrap());
     }
 }
 
@@ -257,7 +250,7 @@ fn a_renderer_carries_nothing_over_from_frame_to_frame() {
 fn identity_view_frames_are_no_view_frames() {
     let (mut posed, camera, settings) = scene(3, 100, 50, 50);
     posed.view_frames = None;
-    let without = render(&posed.as_posed(), &camera, &settings);
+    let without = render(&posed.as_posed(), &settings.view(&camera)).unwrap();
     posed.view_frames = Some(vec![Mat3::IDENTITY; posed.len()]);
-    assert_eq!(render(&posed.as_posed(), &camera, &settings), without);
+    assert_eq!(render(&posed.as_posed(), &settings.view(&camera)).unwrap(), without);
 }

@@ -10,14 +10,15 @@ mod random_scene;
 use differences::{assert_close, assert_gradient, difference};
 use glam::{DVec3, Mat3, Vec3};
 use proptest::prelude::*;
-use random_scene::{Random, camera, posed};
+use random_scene::{Random, Settings, camera, posed};
 use skinsplat_core::scene::{
     Camera, ColourClamp, Image, Mask, OwnedPosed, PosedGradient, Rendered, RenderedGradient, Underlay,
 };
+use skinsplat_render::View;
 use skinsplat_render::definition as reference_splatting;
-use skinsplat_render::definition::{Pane, Parted};
+use skinsplat_render::definition::Blended;
 use skinsplat_render::mesh::{Mesh, SamplePattern, draw};
-use skinsplat_render::splat::{Derivatives, RenderSettings, Renderer, SimdLevel, render};
+use skinsplat_render::splat::{Derivatives, Renderer, SimdLevel, render};
 
 /// A mesh's drawing, or something like it.
 #[derive(Clone)]
@@ -73,25 +74,12 @@ impl Layer {
     fn underlay(&self) -> Underlay<'_> {
         Underlay { colour: &self.colour, coverage: &self.coverage, depth: &self.depth }
     }
-
-    fn panes(&self) -> Vec<Pane> {
-        let pane = |i: usize| {
-            let coverage = f64::from(self.coverage.values()[i]);
-            let depth = f64::from(self.depth.values()[i]);
-            Pane {
-                colour: DVec3::from_array(self.colour.pixels()[i].map(f64::from)),
-                coverage,
-                depth: if coverage > 0.0 { depth } else { 1e30 },
-            }
-        };
-        (0..self.coverage.values().len()).map(pane).collect()
-    }
 }
 
 struct Scene {
     posed: OwnedPosed,
     camera: Camera,
-    settings: RenderSettings,
+    settings: Settings,
     layer: Layer,
     upstream: RenderedGradient,
 }
@@ -101,8 +89,7 @@ impl Scene {
         let mut random = Random(seed);
         let posed = posed(&mut random, count);
         let camera = camera(&mut random, width, height);
-        let background = std::array::from_fn(|_| random.unit() as f32);
-        let settings = RenderSettings { background, antialiased: random.below(2) == 0 };
+        let settings = Settings::random(&mut random);
         let layer = Layer::random(&mut random, &camera);
         let (w, h) = (width as usize, height as usize);
         let mut value = || random.between(-1.0, 1.0) as f32;
@@ -113,60 +100,46 @@ impl Scene {
         Self { posed, camera, settings, layer, upstream }
     }
 
+    fn view(&self) -> View<'_> {
+        self.settings.view(&self.camera).with_underlay(Some(self.layer.underlay()))
+    }
+
     fn draw(&self, renderer: &mut Renderer) -> (Rendered, Mask) {
-        let Self { posed, camera, settings, layer, .. } = self;
-        let (mut rendered, mut shown) = (blank(), Mask::filled(1, 1, 7.0));
-        renderer.render_over(
-            &posed.as_posed(),
-            camera,
-            settings,
-            &layer.underlay(),
-            &mut rendered,
-            &mut shown,
-        );
-        (rendered, shown)
+        drawn(renderer, &self.posed, &self.view())
     }
 
     fn gradient(&self, renderer: &mut Renderer) -> PosedGradient {
-        let Self { posed, camera, settings, layer, upstream } = self;
-        let (rendered, _) = self.draw(renderer);
         let mut gradient = PosedGradient::default();
-        let (underlay, exact) = (layer.underlay(), Derivatives::Exact);
-        renderer.backward_over(
-            &posed.as_posed(),
-            camera,
-            settings,
-            &underlay,
-            &rendered,
-            upstream,
-            exact,
-            &mut gradient,
-        );
+        let (posed, view) = (&self.posed, self.view());
+        renderer.render(&posed.as_posed(), &view).unwrap();
+        renderer.backward(&posed.as_posed(), &view, &self.upstream, &mut gradient, Derivatives::Exact).unwrap();
         gradient
     }
 
-    fn parted(&self) -> Vec<Parted> {
-        reference_splatting::parted(&self.posed.as_posed(), &self.camera, &self.settings, &self.layer.panes())
+    fn selected(&self) -> Vec<Vec<Blended>> {
+        reference_splatting::selected(&self.posed.as_posed(), &self.view()).unwrap()
     }
 
-    fn expected(&self, posed: &OwnedPosed, panes: &[Pane], parted: &[Parted]) -> Vec<[f64; 5]> {
-        reference_splatting::render_parted(&posed.as_posed(), &self.camera, &self.settings, panes, parted)
+    fn expected(&self, posed: &OwnedPosed, layer: &Layer, selected: &[Vec<Blended>]) -> Vec<[f64; 5]> {
+        let view = self.settings.view(&self.camera).with_underlay(Some(layer.underlay()));
+        reference_splatting::render_selected(&posed.as_posed(), &view, selected).unwrap()
     }
 
     /// The loss in f64 whose derivatives by pixel are `upstream`.
-    fn loss(&self, posed: &OwnedPosed, panes: &[Pane], parted: &[Parted]) -> f64 {
+    fn loss(&self, posed: &OwnedPosed, layer: &Layer, selected: &[Vec<Blended>]) -> f64 {
         let of = |(i, pixel): (usize, [f64; 5])| {
             let colour = self.upstream.image.pixels()[i];
             let alpha = self.upstream.alpha.as_ref().map_or(0.0, |alpha| alpha.values()[i]);
             (0..3).map(|c| f64::from(colour[c]) * pixel[c]).sum::<f64>() + f64::from(alpha) * pixel[3]
         };
-        self.expected(posed, panes, parted).into_iter().enumerate().map(of).sum()
+        self.expected(posed, layer, selected).into_iter().enumerate().map(of).sum()
     }
 }
 
-fn blank() -> Rendered {
-    let mask = || Mask::filled(1, 1, 7.0);
-    Rendered { image: Image::filled(1, 1, [7.0; 3]), alpha: mask(), depth: mask() }
+/// A frame with an underlay, and what is shown of that.
+fn drawn(renderer: &mut Renderer, posed: &OwnedPosed, view: &View) -> (Rendered, Mask) {
+    let rendered = renderer.render(&posed.as_posed(), view).unwrap().clone();
+    (rendered, renderer.underlay_weight().unwrap().clone())
 }
 
 fn channels(rendered: &Rendered) -> Vec<[f32; 5]> {
@@ -207,21 +180,12 @@ fn ahead(opacity: f32) -> OwnedPosed {
 #[test]
 fn a_layer_in_front_hides_one_behind_is_seen_through_and_soft_edges_mix() {
     let camera = forward_camera(1);
-    let settings = RenderSettings { background: [0.0, 0.0, 1.0], antialiased: false };
     let posed = ahead(0.75);
     let green = [0.0, 1.0, 0.0];
     let draw = |coverage: f32, depth: f32| {
         let layer = Layer::even(&camera, green, coverage, depth);
-        let (mut rendered, mut shown) = (blank(), Mask::filled(1, 1, 0.0));
-        let underlay = layer.underlay();
-        Renderer::new().render_over(
-            &posed.as_posed(),
-            &camera,
-            &settings,
-            &underlay,
-            &mut rendered,
-            &mut shown,
-        );
+        let view = View::new(&camera).over([0.0, 0.0, 1.0]).with_underlay(Some(layer.underlay()));
+        let (rendered, shown) = drawn(&mut Renderer::new(), &posed, &view);
         (channels(&rendered)[0], shown.values()[0])
     };
     let close = |(found, shown): ([f32; 5], f32), expected: [f32; 5], seen: f32| {
@@ -252,10 +216,8 @@ fn little_light_is_enough_for_a_layer_but_not_for_a_splat() {
         posed.sh.push([0.5 / 0.282_094_8; 3]);
     }
     let layer = Layer::even(&camera, [0.0, 1.0, 0.0], 1.0, 3.0);
-    let (mut rendered, mut shown) = (blank(), Mask::filled(1, 1, 0.0));
-    let underlay = layer.underlay();
-    let settings = RenderSettings::default();
-    Renderer::new().render_over(&posed.as_posed(), &camera, &settings, &underlay, &mut rendered, &mut shown);
+    let view = View::new(&camera).with_underlay(Some(layer.underlay()));
+    let (rendered, shown) = drawn(&mut Renderer::new(), &posed, &view);
     // The first leaves a hundredth, the second would leave a ten-thousandth less a rounding: whatever it does, the rest
     // is the layer's.
     let red = channels(&rendered)[0];
@@ -274,18 +236,8 @@ fn a_drawn_mesh_hides_what_lies_behind_it() {
     let draw = |z: f32| {
         let mut posed = ahead(0.9);
         posed.means[0].z = z;
-        let (mut rendered, mut shown) = (blank(), Mask::filled(1, 1, 0.0));
-        let underlay = drawing.underlay();
-        let settings = RenderSettings::default();
-        Renderer::new().render_over(
-            &posed.as_posed(),
-            &camera,
-            &settings,
-            &underlay,
-            &mut rendered,
-            &mut shown,
-        );
-        rendered.image
+        let view = View::new(&camera).with_underlay(Some(drawing.underlay()));
+        render(&posed.as_posed(), &view).unwrap().image
     };
     // On the middle column the triangle's depth rises from about 1.7 to 2.3 over the image.
     let image = draw(2.0);
@@ -309,13 +261,14 @@ proptest! {
         let scene = Scene::new(seed, count, width, height);
         let (rendered, shown) = scene.draw(&mut Renderer::new());
         let found = channels(&rendered);
-        let (panes, parted) = (scene.layer.panes(), scene.parted());
-        let expected = scene.expected(&scene.posed, &panes, &parted);
+        let selected = scene.selected();
+        let expected = scene.expected(&scene.posed, &scene.layer, &selected);
         let mut errors: Vec<f64> = std::iter::zip(&found, &expected)
             .flat_map(|(a, b)| (0..5).map(|c| (f64::from(a[c]) - b[c]).abs() / [1.0, 1.0, 1.0, 1.0, 10.0][c]))
             .collect();
-        let brighter: Vec<Pane> = panes.iter().map(|p| Pane { colour: p.colour + 1.0, ..*p }).collect();
-        let lit = scene.expected(&scene.posed, &brighter, &parted);
+        let mut brighter = scene.layer.clone();
+        brighter.colour.pixels_mut().as_flattened_mut().iter_mut().for_each(|c| *c += 1.0);
+        let lit = scene.expected(&scene.posed, &brighter, &selected);
         let weights = std::iter::zip(&lit, &expected).map(|(a, b)| a[0] - b[0]);
         errors.extend(std::iter::zip(weights, shown.values()).map(|(a, &b)| (a - f64::from(b)).abs()));
         errors.sort_unstable_by(f64::total_cmp);
@@ -337,7 +290,7 @@ proptest! {
         let one = with_threads(1);
         prop_assert!(with_threads(2) == one);
         prop_assert!(with_threads(5) == one);
-        for level in [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512] {
+        for level in SimdLevel::ALL {
             if let Some(mut renderer) = Renderer::with_simd_level(level) {
                 prop_assert!(all(&mut renderer) == one, "{level:?}");
             }
@@ -347,7 +300,7 @@ proptest! {
     #[test]
     fn where_nothing_is_covered_the_pixel_is_as_without_a_layer(seed: u64, width in 1_u32..300, height in 1_u32..50) {
         let mut scene = Scene::new(seed, 500, width, height);
-        let plain = bits(&render(&scene.posed.as_posed(), &scene.camera, &scene.settings));
+        let plain = bits(&render(&scene.posed.as_posed(), &scene.settings.view(&scene.camera)).unwrap());
         let (over, shown) = scene.draw(&mut Renderer::new());
         let over = bits(&over);
         for (i, &coverage) in scene.layer.coverage.values().iter().enumerate() {
@@ -361,9 +314,10 @@ proptest! {
         let mut gradient = PosedGradient::default();
         let mut renderer = Renderer::new();
         let Scene { posed, camera, settings, upstream, .. } = &scene;
-        let rendered = renderer.render(&posed.as_posed(), camera, settings);
-        let exact = Derivatives::Exact;
-        renderer.backward(&posed.as_posed(), camera, settings, &rendered, upstream, exact, &mut gradient);
+        let view = settings.view(camera);
+        renderer.render(&posed.as_posed(), &view).unwrap();
+        prop_assert_eq!(renderer.underlay_weight(), None);
+        renderer.backward(&posed.as_posed(), &view, upstream, &mut gradient, Derivatives::Exact).unwrap();
         prop_assert_eq!(scene.gradient(&mut Renderer::new()), gradient);
     }
 }
@@ -374,15 +328,15 @@ fn every_kind_of_parameter_has_the_derivative_of_the_definition() {
     for seed in 0..24 {
         let scene = Scene::new(seed, 14, 24, 20);
         let posed = &scene.posed;
-        let parted = scene.parted();
-        for Parted { chosen, front } in &parted {
-            parts[0] += front;
-            parts[1] += chosen.len() - front;
+        let selected = scene.selected();
+        for blended in &selected {
+            let front = blended.iter().position(|part| *part == Blended::Underlay);
+            parts[0] += front.unwrap_or(blended.len());
+            parts[1] += front.map_or(0, |front| blended.len() - front - 1);
         }
         let gradient = scene.gradient(&mut Renderer::new());
-        let panes = scene.layer.panes();
         println!("seed {seed}");
-        assert_gradient(posed, &gradient, |p| scene.loss(p, &panes, &parted));
+        assert_gradient(posed, &gradient, |p| scene.loss(p, &scene.layer, &selected));
     }
     assert!(parts.iter().all(|&n| n > 1500), "{parts:?}");
 }
@@ -390,19 +344,18 @@ fn every_kind_of_parameter_has_the_derivative_of_the_definition() {
 #[test]
 fn the_layers_colour_has_the_derivative_that_is_shown() {
     let scene = Scene::new(3, 40, 24, 20);
-    let parted = scene.parted();
+    let selected = scene.selected();
     let (_, shown) = scene.draw(&mut Renderer::new());
-    let mut panes = scene.layer.panes();
     let (mut found, mut expected) = (Vec::new(), Vec::new());
-    for i in 0..panes.len() {
+    for i in 0..shown.values().len() {
         for c in 0..3 {
-            let mut at = |value: f64| {
-                panes[i].colour[c] += value;
-                let loss = scene.loss(&scene.posed, &panes, &parted);
-                panes[i].colour[c] -= value;
-                loss
+            // The image is linear in the layer's colour.
+            let at = |value: f32| {
+                let mut layer = scene.layer.clone();
+                layer.colour.pixels_mut()[i][c] = value;
+                scene.loss(&scene.posed, &layer, &selected)
             };
-            expected.push((at(1e-3) - at(-1e-3)) / 2e-3);
+            expected.push(at(1.0) - at(0.0));
             found.push(scene.upstream.image.pixels()[i][c] * shown.values()[i]);
         }
     }
@@ -422,29 +375,35 @@ fn long_lists_have_the_image_and_the_derivatives_of_the_definition() {
     let mut renderer = Renderer::new();
     let (rendered, _) = scene.draw(&mut renderer);
     assert!(renderer.visible() > 2 * 4096, "{} splats", renderer.visible());
-    let (panes, parted) = (scene.layer.panes(), scene.parted());
-    let expected = scene.expected(&scene.posed, &panes, &parted);
+    let selected = scene.selected();
+    let expected = scene.expected(&scene.posed, &scene.layer, &selected);
     let far = std::iter::zip(channels(&rendered), &expected)
         .filter(|(a, b)| (0..5).any(|c| (f64::from(a[c]) - b[c]).abs() > 5e-4))
         .count();
     assert!(far < 8, "{far} pixels differ");
     let gradient = scene.gradient(&mut renderer);
-    let mut drawn: Vec<usize> = parted.iter().flat_map(|p| p.chosen.clone()).collect();
+    let gaussian = |blended: &Blended| match *blended {
+        Blended::Gaussian(i) => Some(i),
+        Blended::Underlay => None,
+    };
+    let mut drawn: Vec<usize> = selected.iter().flatten().filter_map(gaussian).collect();
     drawn.sort_unstable();
     drawn.dedup();
     let some: Vec<usize> = drawn.into_iter().step_by(400).collect();
     assert!(some.len() > 10);
-    let loss = |p: &OwnedPosed| scene.loss(p, &panes, &parted);
-    let expected: Vec<f64> =
-        some.iter().map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i])).collect();
+    let loss = |p: &OwnedPosed| scene.loss(p, &scene.layer, &selected);
+    let expected: Vec<f64> = some
+        .iter()
+        .map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i]))
+        .collect();
     let found: Vec<f32> = some.iter().map(|&i| gradient.opacities[i]).collect();
     assert_close("opacities", &found, &expected, 1e-4);
 }
 
 #[test]
-#[should_panic(expected = "the underlay's coverage must have the camera's size")]
 fn a_layer_of_another_size_is_refused() {
     let mut scene = Scene::new(1, 3, 8, 8);
     scene.layer.coverage = Mask::filled(7, 8, 1.0);
-    scene.draw(&mut Renderer::new());
+    let error = render(&scene.posed.as_posed(), &scene.view()).unwrap_err().to_string();
+    assert_eq!(error, "underlay.coverage: 7x8 pixels; expected the camera's 8x8");
 }

@@ -8,7 +8,8 @@ use glam::DVec3;
 use proptest::prelude::{ProptestConfig, any, prop_assert, prop_assert_eq, proptest};
 use skinsplat_core::scene::{Camera, PosedBody};
 use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy, pose};
-use skinsplat_render::splat::{RenderSettings, Renderer};
+use skinsplat_render::View;
+use skinsplat_render::splat::{Renderer, render};
 use skinsplat_study::trade::savings::{Options, Same, measure};
 
 #[test]
@@ -52,18 +53,18 @@ proptest! {
         let target = DVec3::new(0.4, 0.0, 0.01 * shift);
         let mut camera = Camera::look_at(DVec3::from_array(eye), target, DVec3::Y, focal, 72, 40);
         camera.cx += shift;
-        let settings = RenderSettings::default();
+        let view = View::new(&camera);
         for spec in ["quaternion-average", "quaternion-average+colour=view-rotation", "lbs", "view-canonical"] {
             let strategy: Strategy = spec.parse().unwrap();
             let mut renderer = Renderer::new();
             // Memory of another pose must not shine through.
             let mut poser = Poser::new();
             let all = poser.pose(&bound, &posed_body, &strategy, &PoseOptions::default()).unwrap();
-            let full = renderer.render(&all, &camera, &settings);
+            let full = renderer.render(&all, &view).unwrap().clone();
             let visible = renderer.visible();
             let options = PoseOptions { seen_by: Some(&camera), ..PoseOptions::default() };
             let seen = poser.pose(&bound, &posed_body, &strategy, &options).unwrap();
-            prop_assert!(full == renderer.render(&seen, &camera, &settings), "{spec}");
+            prop_assert!(&full == renderer.render(&seen, &view).unwrap(), "{spec}");
             prop_assert_eq!(visible, renderer.visible());
         }
     }
@@ -84,7 +85,7 @@ proptest! {
         for strategy in [Strategy::preset("quaternion-average").unwrap(), Strategy::preset("lbs").unwrap()] {
             let image = |bound: &BoundAvatar| {
                 let posed = pose(bound, &posed_body, &strategy).unwrap();
-                Renderer::new().render(&posed.as_posed(), &camera, &RenderSettings::default())
+                render(&posed.as_posed(), &View::new(&camera)).unwrap()
             };
             prop_assert!(image(&stored) == image(&needed), "{strategy}");
         }

@@ -167,14 +167,7 @@ impl Avatar {
                     ));
                 }
                 let Some(body) = body else { return Ok(()) };
-                let joints = body.skeleton.len();
-                match (0..n).find(|&i| weights.row(i).0.iter().any(|&j| usize::from(j) >= joints)) {
-                    Some(i) => {
-                        let expected = format!("indices below the body's {joints} joints");
-                        Err(SceneError::new(format!("joint[{i}]"), "joint index out of range", expected))
-                    }
-                    None => Ok(()),
-                }
+                weights.check_joints("joint", body.skeleton.num_joints())
             }
             Binding::Face(binding) => binding.validate(n, body),
         }

@@ -34,7 +34,7 @@ pub struct RestBody {
 const MAX_COORDINATE: f64 = 1e12;
 
 impl RestBody {
-    /// Checks counts and indices.
+    /// Checks counts, indices and coordinates.
     ///
     /// # Errors
     /// Names the first field that is wrong.
@@ -47,10 +47,8 @@ impl RestBody {
                 format!("{v} (vertices)"),
             ));
         }
-        let too_far = |p: &DVec3| p.to_array().into_iter().any(|c| c.is_nan() || c.abs() > MAX_COORDINATE);
-        if let Some(i) = self.vertices.iter().position(too_far) {
-            let [x, y, z] = self.vertices[i].to_array();
-            let problem = format!("({x:e}, {y:e}, {z:e})");
+        self.weights.check_joints("weights", self.skeleton.num_joints())?;
+        if let Some((i, problem)) = self.first_far_vertex() {
             let expected = format!("metres, at most {MAX_COORDINATE:e} from the origin");
             return Err(SceneError::new(format!("v_template[{i}]"), problem, expected));
         }
@@ -86,6 +84,14 @@ impl RestBody {
     pub fn weights_at(&self, face: u32, barycentric: [f64; 3]) -> Vec<(usize, f32)> {
         let corners = self.faces[face as usize];
         self.weights.mixed(&[0, 1, 2].map(|k: usize| (corners[k] as usize, barycentric[k])))
+    }
+
+    /// The first vertex beyond [`MAX_COORDINATE`], and where it is.
+    fn first_far_vertex(&self) -> Option<(usize, String)> {
+        let too_far = |p: &DVec3| p.to_array().into_iter().any(|c| c.is_nan() || c.abs() > MAX_COORDINATE);
+        let i = self.vertices.iter().position(too_far)?;
+        let [x, y, z] = self.vertices[i].to_array();
+        Some((i, format!("({x:e}, {y:e}, {z:e})")))
     }
 
     /// The same body with every vertex moved along its rest normal (clothing), metres. Joints stay where they are.
@@ -145,6 +151,10 @@ impl Body {
                 *vertex += offset.as_dvec3() * beta;
             }
         }
+        if let Some((i, place)) = rest.first_far_vertex() {
+            let expected = format!("a body within {MAX_COORDINATE:e} m of the origin");
+            return Err(SceneError::new("betas", format!("they move vertex {i} to {place}"), expected));
+        }
         if !shape.joint_regressor.is_empty() {
             let joint = |row: &Vec<(u32, f32)>| -> DVec3 {
                 row.iter().map(|&(v, w)| rest.vertices[v as usize] * f64::from(w)).sum()
@@ -169,4 +179,49 @@ pub fn vertex_normals(vertices: &[DVec3], faces: &[[u32; 3]]) -> Vec<DVec3> {
     }
     normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
     normals
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arm() -> RestBody {
+        let names = vec!["shoulder".into(), "elbow".into()];
+        let skeleton =
+            Skeleton::from_joint_positions(names, vec![None, Some(0)], &[DVec3::ZERO, DVec3::X]).unwrap();
+        RestBody {
+            skeleton,
+            vertices: vec![DVec3::X * 2.0, DVec3::X * 0.5, DVec3::Y],
+            faces: vec![[0, 1, 2]],
+            weights: SkinWeights::from_rows([vec![(1, 1.0)], vec![(0, 1.0)], vec![(0, 0.5), (1, 0.5)]], 2)
+                .unwrap(),
+            uv: None,
+            pose_directions: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn joints_that_only_carry_deform_nothing() {
+        let mut body = arm();
+        body.skeleton.inverse_binds.pop();
+        assert_eq!((body.skeleton.len(), body.skeleton.num_joints()), (2, 1));
+        assert_eq!(body.validate().unwrap_err().field, "weights[0]");
+    }
+
+    /// What can be read as an `f64` and not be squared.
+    #[test]
+    fn coordinates_beyond_what_can_be_squared_are_refused_by_name() {
+        let mut body = arm();
+        body.vertices[2].y = 1e160;
+        assert_eq!(body.validate().unwrap_err().field, "v_template[2]");
+        let direction = vec![Vec3::ZERO, Vec3::X, Vec3::ZERO];
+        let shape = ShapeSpace { directions: vec![direction], joint_regressor: Vec::new() };
+        let model = Body { rest: arm(), shape: Some(shape) };
+        model.shaped(&[1e9]).unwrap().validate().unwrap();
+        for beta in [1e13, 1e160, -1e300] {
+            let error = model.shaped(&[beta]).unwrap_err();
+            assert_eq!(error.field, "betas");
+            assert!(error.problem.starts_with("they move vertex 1 to"), "{error}");
+        }
+    }
 }

@@ -23,25 +23,37 @@ pub struct Camera {
     pub camera_from_world: DMat4,
 }
 
-/// No image side above this is accepted: a header or a typo must not cause a 4 GB allocation.
-pub const MAX_IMAGE_SIDE: u32 = 1 << 15;
+/// No image side above this is accepted: twice the 8,192 of the largest cameras, since some are drawn at twice their size.
+pub const MAX_IMAGE_SIDE: u32 = 1 << 14;
+/// No image of more pixels than this is accepted: a header or a typo must not cause an allocation of many gigabytes. A
+/// frame of so many pixels takes 1.3 GB to draw.
+pub const MAX_IMAGE_PIXELS: u64 = 1 << 26;
+
+/// Checks the size of an image before memory is asked for.
+///
+/// # Errors
+/// No pixels, more than [`MAX_IMAGE_SIDE`] on a side (`width` or `height`), more than [`MAX_IMAGE_PIXELS`] in all (`size`).
+pub fn check_image_size(width: u32, height: u32) -> Result<(), SceneError> {
+    for (field, side) in [("width", width), ("height", height)] {
+        if side == 0 || side > MAX_IMAGE_SIDE {
+            return Err(SceneError::new(field, format!("{side} pixels"), format!("1 to {MAX_IMAGE_SIDE}")));
+        }
+    }
+    if u64::from(width) * u64::from(height) > MAX_IMAGE_PIXELS {
+        let expected = format!("at most {MAX_IMAGE_PIXELS} pixels in all");
+        return Err(SceneError::new("size", format!("{width}x{height} pixels"), expected));
+    }
+    Ok(())
+}
 
 impl Camera {
-    /// Checks every invariant: sizes within `1..=MAX_IMAGE_SIDE`, finite and positive focal lengths, finite principal
+    /// Checks every invariant: a size that [`check_image_size`] accepts, finite and positive focal lengths, finite principal
     /// point, finite and invertible affine transform.
     ///
     /// # Errors
     /// Names the first field that is wrong.
     pub fn validate(&self) -> Result<(), SceneError> {
-        for (field, side) in [("width", self.width), ("height", self.height)] {
-            if side == 0 || side > MAX_IMAGE_SIDE {
-                return Err(SceneError::new(
-                    field,
-                    format!("{side} pixels"),
-                    format!("1 to {MAX_IMAGE_SIDE}"),
-                ));
-            }
-        }
+        check_image_size(self.width, self.height)?;
         for (field, focal) in [("fx", self.fx), ("fy", self.fy)] {
             if !(focal.is_finite() && focal > 0.0) {
                 return Err(SceneError::new(
@@ -124,6 +136,23 @@ mod tests {
         );
         assert!(camera.project(DVec3::Y * 1.1).unwrap().0.y < 240.0, "up is towards row 0");
         assert!(camera.project(eye * 2.0).is_none(), "behind");
+    }
+
+    #[test]
+    fn sizes_that_no_memory_should_be_asked_for_are_refused_by_name() {
+        for (width, height, field) in [
+            (0, 8, "width"),
+            (8, MAX_IMAGE_SIDE + 1, "height"),
+            (32_768, 32_768, "width"),
+            (8193, 8192, "size"),
+            (MAX_IMAGE_SIDE, 4097, "size"),
+        ] {
+            let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 100.0, width, height);
+            assert_eq!(camera.validate().unwrap_err().field, field, "{width}x{height}");
+        }
+        for (width, height) in [(8192, 8192), (MAX_IMAGE_SIDE, 4096), (1, 1)] {
+            Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 100.0, width, height).validate().unwrap();
+        }
     }
 
     #[test]

@@ -62,6 +62,20 @@ impl SkinWeights {
         (&self.joints[range.clone()], &self.weights[range])
     }
 
+    /// Checks that every joint index is below `num_joints`, the joints that deform the mesh
+    /// ([`Skeleton::num_joints`](super::Skeleton::num_joints)).
+    ///
+    /// # Errors
+    /// The first row with another; the error's field is `field[row]`.
+    pub fn check_joints(&self, field: &str, num_joints: usize) -> Result<(), SceneError> {
+        let Some(at) = self.joints.iter().position(|&joint| usize::from(joint) >= num_joints) else {
+            return Ok(());
+        };
+        let row = self.offsets.partition_point(|&offset| offset as usize <= at) - 1;
+        let expected = format!("an index below the body's {num_joints} joints");
+        Err(SceneError::new(format!("{field}[{row}]"), format!("joint {}", self.joints[at]), expected))
+    }
+
     /// The largest number of influences in any row.
     pub fn max_influences(&self) -> usize {
         self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
@@ -143,6 +157,16 @@ mod tests {
         assert_eq!(weights.row(0), (&[2u16, 1][..], &[0.75f32, 0.25][..]));
         assert_eq!((weights.len(), weights.max_influences()), (2, 2));
         assert_eq!(weights.mixed(&[(0, 0.5), (1, 0.5)]), vec![(0, 0.5), (1, 0.125), (2, 0.375)]);
+    }
+
+    #[test]
+    fn the_row_of_a_joint_that_the_body_lacks_is_named() {
+        let rows = [vec![(0, 1.0)], vec![(0, 0.5), (1, 0.5)], vec![(2, 0.75), (0, 0.25)], vec![(1, 1.0)]];
+        let weights = SkinWeights::from_rows(rows, 3).unwrap();
+        weights.check_joints("joint", 3).unwrap();
+        let error = weights.check_joints("joint", 2).unwrap_err().to_string();
+        assert_eq!(error, "joint[2]: joint 2; expected an index below the body's 2 joints");
+        assert_eq!(weights.check_joints("weights", 0).unwrap_err().field, "weights[0]");
     }
 
     #[test]

@@ -52,6 +52,8 @@ fn what_is_wrong_with_a_camera_is_named() {
         (CAMERA.replace("320.25", "1e400"), "camera"),
         (CAMERA.replace("\"width\": 640", "\"width\": 0"), "width"),
         (CAMERA.replace("\"width\": 640", "\"width\": 4000000000"), "width"),
+        (CAMERA.replace("\"width\": 640", "\"width\": 32768"), "width"),
+        (CAMERA.replace("640", "16384").replace("480", "16384"), "size"),
         (CAMERA.replace("\"width\": 640, ", ""), "camera"),
         (CAMERA.replace("[0, 0, -1, 3]", "[0, 0, 0, 3]"), "world_to_camera"),
         (CAMERA.replace("[0, 0, 0, 1]", "[0, 0, 1, 1]"), "world_to_camera"),
@@ -165,6 +167,17 @@ fn images_are_written_rounded_to_8_bits_or_exactly() {
     let npy = folder.path().join("image.npy");
     frames::save_npy(&npy, &finite).unwrap();
     assert_eq!(frames::load_image(&npy).unwrap(), (finite, None));
+}
+
+/// Black, 16,384 pixels a side, in a quarter of a megabyte: within what deflate reaches, and refused by its header.
+#[test]
+fn an_image_of_more_pixels_than_the_limit_is_refused_before_it_is_decoded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bomb.png");
+    std::fs::write(&path, encode((16_384, 16_384), 8, 0, &[], &[0; 16_384])).unwrap();
+    // The limit speaks before the data that are missing could.
+    let error = frames::load_image(&path).unwrap_err().to_string();
+    assert!(error.contains("image: size: 16384x16384 pixels; expected at most 67108864 pixels"), "{error}");
 }
 
 #[test]

@@ -53,7 +53,7 @@ impl Dssim {
         let sums: Vec<f64> = strips
             .enumerate()
             .map(|(strip, ((m, p), q))| {
-                pulp::Arch::new().dispatch(Partials {
+                skinsplat_simd::arch().dispatch(Partials {
                     sources: &sources,
                     first: strip * STRIP,
                     out: [m, p, q],
@@ -63,7 +63,7 @@ impl Dssim {
         let width = image.width();
         let target = &mut gradient.pixels_mut()[window.y.start * width..window.y.end * width];
         target.par_chunks_mut(STRIP * width).enumerate().for_each(|(strip, out)| {
-            pulp::Arch::new().dispatch(Gather {
+            skinsplat_simd::arch().dispatch(Gather {
                 sources: &sources,
                 partials: &self.partials,
                 first: strip * STRIP,

@@ -16,8 +16,6 @@ pub(super) struct Layer {
     pub(super) textured: TexturedBody,
     moments: Adam,
     rate: f32,
-    /// What is shown of the drawing in the frame drawn last.
-    pub(super) shown: Mask,
     gradient: Image,
 }
 
@@ -64,7 +62,7 @@ impl Layer {
     fn with(textured: TexturedBody, moments: Adam, recipe: &MeshLayer) -> Self {
         let texels = textured.texture.image();
         let gradient = Image::filled(texels.width(), texels.height(), [0.0; 3]);
-        Self { textured, moments, rate: recipe.rate, shown: Mask::filled(1, 1, 0.0), gradient }
+        Self { textured, moments, rate: recipe.rate, gradient }
     }
 
     pub(super) fn state(&self) -> State {
@@ -79,13 +77,20 @@ impl Layer {
         self.textured.drawing(pose, camera, SamplePattern::new(SAMPLES))
     }
 
-    /// One step of the texels, against derivatives of the image of the frame drawn last.
-    pub(super) fn step(&mut self, pose: &Pose, camera: &Camera, of_image: &Image) -> Result<(), SceneError> {
+    /// One step of the texels, against derivatives of the image of the frame drawn last, in which the drawing's colours
+    /// are `shown` with these weights.
+    pub(super) fn step(
+        &mut self,
+        pose: &Pose,
+        camera: &Camera,
+        of_image: &Image,
+        shown: &Mask,
+    ) -> Result<(), SceneError> {
         if self.rate == 0.0 {
             return Ok(());
         }
         let weighted = |(colour, &shown): (&[f32; 3], &f32)| colour.map(|c| c * shown);
-        let pixels = of_image.pixels().iter().zip(self.shown.values()).map(weighted).collect();
+        let pixels = of_image.pixels().iter().zip(shown.values()).map(weighted).collect();
         let upstream = Image::new(of_image.width(), of_image.height(), pixels)?;
         let pattern = SamplePattern::new(SAMPLES);
         self.textured.backward(pose, camera, pattern, &upstream, &mut self.gradient)?;

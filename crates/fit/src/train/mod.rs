@@ -36,7 +36,8 @@ use skinsplat_data::sequence::Sequence;
 use skinsplat_posing::nearest::NearestFace;
 use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
 use skinsplat_render::mesh::Drawing;
-use skinsplat_render::splat::{Derivatives, RenderSettings, Renderer};
+use skinsplat_render::View;
+use skinsplat_render::splat::{Derivatives, Renderer};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -91,7 +92,6 @@ pub struct Trainer<'a> {
 struct Scratch {
     poser: Poser,
     renderer: Renderer,
-    rendered: Rendered,
     truth: Image,
     losses: Losses,
     of_rendered: RenderedGradient,
@@ -289,42 +289,22 @@ impl<'a> Trainer<'a> {
         let frame = self.frames.of_iteration(self.iteration as usize, &mut self.warnings)?;
         let body = PosedBody::new(&self.sequence.body, frame.pose).map_err(Error::scene(self.sequence))?;
         let (strategy, posing) = (&self.strategy, PoseOptions::default());
-        let Scratch { poser, renderer, rendered, truth, losses, of_rendered, of_posed, of_avatar } =
+        let Scratch { poser, renderer, truth, losses, of_rendered, of_posed, of_avatar } =
             &mut self.scratch;
         let posed = poser.pose(&self.bound, &body, strategy, &posing).map_err(&in_strategy)?;
         let background = background(recipe.background, self.options.seed, self.iteration);
-        let settings = RenderSettings { background, antialiased: false };
         let in_scene = Error::scene(self.sequence);
         let drawing = self.layer.as_ref().map(|layer| layer.draw(frame.pose, frame.camera));
         let drawing = drawing.transpose().map_err(&in_scene)?;
         let underlay = drawing.as_ref().map(Drawing::underlay);
-        match (&underlay, &mut self.layer) {
-            (Some(underlay), Some(layer)) => {
-                let shown = &mut layer.shown;
-                renderer.render_over(&posed, frame.camera, &settings, underlay, rendered, shown);
-            }
-            _ => renderer.render_into(&posed, frame.camera, &settings, rendered),
-        }
+        let view = View::new(frame.camera).over(background).with_underlay(underlay);
+        let Rendered { image, alpha, .. } = renderer.render(&posed, &view).map_err(&in_scene)?;
         composite(&frame.truth.rgb, &frame.truth.alpha, background, truth);
-        let Rendered { image, alpha, .. } = &*rendered;
         let weights = Weights { ssim: recipe.loss.ssim, silhouette: recipe.loss.silhouette };
         let loss = losses.frame((image, alpha), (truth, &frame.truth.alpha), &weights, of_rendered);
-        let (camera, exact) = (frame.camera, Derivatives::Exact);
-        match &underlay {
-            Some(underlay) => renderer.backward_over(
-                &posed,
-                camera,
-                &settings,
-                underlay,
-                rendered,
-                of_rendered,
-                exact,
-                of_posed,
-            ),
-            None => renderer.backward(&posed, camera, &settings, rendered, of_rendered, exact, of_posed),
-        }
-        if let Some(layer) = &mut self.layer {
-            layer.step(frame.pose, camera, &of_rendered.image).map_err(&in_scene)?;
+        renderer.backward(&posed, &view, of_rendered, of_posed, Derivatives::Exact).map_err(&in_scene)?;
+        if let (Some(layer), Some(shown)) = (&mut self.layer, renderer.underlay_weight()) {
+            layer.step(frame.pose, frame.camera, &of_rendered.image, shown).map_err(&in_scene)?;
         }
         let Avatar { gaussians, binding } = &self.parameters.avatar;
         of_avatar.reset(gaussians, matches!(binding, Binding::Face(_)));
@@ -384,11 +364,9 @@ impl<'a> Trainer<'a> {
 impl Scratch {
     fn new() -> Self {
         let image = || Image::filled(1, 1, [0.0; 3]);
-        let mask = || Mask::filled(1, 1, 0.0);
         Self {
             poser: Poser::new(),
             renderer: Renderer::new(),
-            rendered: Rendered { image: image(), alpha: mask(), depth: mask() },
             truth: image(),
             losses: Losses::default(),
             of_rendered: RenderedGradient { image: image(), alpha: None },

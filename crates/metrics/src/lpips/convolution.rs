@@ -86,7 +86,7 @@ impl Convolution {
 
     /// `max(0, weights * input + bias)`.
     pub fn rectified(&self, input: &FeatureMap) -> FeatureMap {
-        self.rectified_on(pulp::Arch::new(), input)
+        self.rectified_on(skinsplat_simd::arch(), input)
     }
 
     fn rectified_on(&self, arch: pulp::Arch, input: &FeatureMap) -> FeatureMap {
@@ -280,7 +280,7 @@ pub(super) fn max_pooled(input: &FeatureMap, size: usize, stride: usize) -> Feat
     let output = |side: usize| if side < size { 0 } else { (side - size) / stride + 1 };
     let (width, height, channels) = (output(input.width), output(input.height), input.channels);
     let mut pooled = FeatureMap::zeros(width, height, channels);
-    let arch = pulp::Arch::new();
+    let arch = skinsplat_simd::arch();
     let rows = pooled.values.par_chunks_mut((width * channels).max(1)).enumerate();
     rows.for_each(|(y, row)| arch.dispatch(PooledRow { input, size, stride, y, row }));
     pooled

@@ -34,7 +34,7 @@ impl FeatureMap {
 
     /// The mean over the pixels of `Σ_c w_c (a_c / |a| - b_c / |b|)²`. Sums run in f64 in a fixed order.
     pub(super) fn weighted_distance(&self, other: &Self, weights: &[f64]) -> f64 {
-        let arch = pulp::Arch::new();
+        let arch = skinsplat_simd::arch();
         let row = self.width * self.channels;
         let rows = self.values.par_chunks_exact(row).zip(other.values.par_chunks_exact(row));
         let sums: Vec<f64> = rows.map(|(a, b)| arch.dispatch(Row { a, b, weights })).collect();

@@ -68,7 +68,7 @@ impl Tile<'_> {
         weights: Option<&[f64]>,
         scratch: &mut Scratch,
     ) -> f64 {
-        pulp::Arch::new().dispatch(Sum { tile: self, window, constants, weights, scratch })
+        skinsplat_simd::arch().dispatch(Sum { tile: self, window, constants, weights, scratch })
     }
 
     #[inline(always)]

@@ -7,10 +7,10 @@ mod tiled;
 
 pub use tiled::{Drawn, draw};
 
-use crate::splat::RenderSettings;
+use crate::View;
 use glam::DVec3;
 use project::{Splat, sorted, splats};
-use skinsplat_core::scene::{Camera, Posed};
+use skinsplat_core::scene::{Posed, SceneError, Underlay};
 
 /// What is skipped.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,109 +31,110 @@ impl Cutoffs {
     pub const STOCK: Self = Self { alpha: 1.0 / 255.0, transmittance: 1e-4, three_sigma: true };
 }
 
-/// What a pixel shows besides Gaussians.
-#[derive(Clone, Copy)]
-pub struct Pane {
-    /// Linear order R, G, B.
-    pub colour: DVec3,
-    /// Its alpha.
-    pub coverage: f64,
-    /// Camera depth, metres: Gaussians at it or beyond lie behind.
-    pub depth: f64,
-}
-
-/// The Gaussians that a pixel blends, front to back, and how many of them lie in front of its pane.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Parted {
-    /// Indices of Gaussians.
-    pub chosen: Vec<usize>,
-    /// So many of them lie in front.
-    pub front: usize,
-}
-
-/// [`chosen`] with a pane in every pixel.
-pub fn parted(posed: &Posed, camera: &Camera, settings: &RenderSettings, panes: &[Pane]) -> Vec<Parted> {
-    let splats = sorted(posed, camera, settings, Cutoffs::STOCK);
-    std::iter::zip(pixels(camera), panes).map(|(pixel, pane)| part(&splats, pixel, pane)).collect()
-}
-
-/// [`render_chosen`] with a pane in every pixel.
-pub fn render_parted(
-    posed: &Posed,
-    camera: &Camera,
-    settings: &RenderSettings,
-    panes: &[Pane],
-    parted: &[Parted],
-) -> Vec<[f64; 5]> {
-    let splats = splats(posed, camera, settings, Cutoffs::STOCK);
-    let background = DVec3::from_array(settings.background.map(f64::from));
-    std::iter::zip(pixels(camera), std::iter::zip(panes, parted))
-        .map(|(pixel, (pane, Parted { chosen, front }))| {
-            let of = |chosen: &[usize]| -> Vec<&Splat> {
-                chosen.iter().filter_map(|&i| splats[i].as_ref()).collect()
-            };
-            let behind = blend(of(&chosen[*front..]).into_iter(), pixel, background);
-            let through = |c: usize, own: f64| own * pane.coverage + behind[c] * (1.0 - pane.coverage);
-            let [r, g, b] = [0, 1, 2].map(|c| through(c, pane.colour[c]));
-            let (alpha, depth) = (through(3, 1.0), through(4, pane.depth));
-            let front = blend(of(&chosen[..*front]).into_iter(), pixel, DVec3::new(r, g, b));
-            let left = 1.0 - front[3];
-            [front[0], front[1], front[2], front[3] + left * alpha, front[4] + left * depth]
-        })
-        .collect()
+/// One of the things that a pixel blends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blended {
+    /// A Gaussian, by its index.
+    Gaussian(usize),
+    /// The view's underlay.
+    Underlay,
 }
 
 /// Colour over the background, alpha and depth of every pixel, row by row.
-pub fn render(posed: &Posed, camera: &Camera, settings: &RenderSettings) -> Vec<[f64; 5]> {
-    render_chosen(posed, camera, settings, &chosen(posed, camera, settings))
+///
+/// # Errors
+/// As [`crate::splat::Renderer::render`].
+pub fn render(posed: &Posed, view: &View) -> Result<Vec<[f64; 5]>, SceneError> {
+    render_selected(posed, view, &selected(posed, view)?)
 }
 
-/// The Gaussians that every pixel blends, front to back.
-pub fn chosen(posed: &Posed, camera: &Camera, settings: &RenderSettings) -> Vec<Vec<usize>> {
-    let splats = sorted(posed, camera, settings, Cutoffs::STOCK);
-    let nothing = Pane { colour: DVec3::ZERO, coverage: 0.0, depth: f64::INFINITY };
-    pixels(camera).map(|pixel| part(&splats, pixel, &nothing).chosen).collect()
+/// What every pixel blends, front to back.
+///
+/// # Errors
+/// As [`crate::splat::Renderer::render`].
+pub fn selected(posed: &Posed, view: &View) -> Result<Vec<Vec<Blended>>, SceneError> {
+    view.check(posed)?;
+    let splats = sorted(posed, view, Cutoffs::STOCK);
+    let of_pixel = |pixel| {
+        let mut blended = Vec::new();
+        walk(&splats, pixel, underlay_at(view, pixel), Cutoffs::STOCK, |step, _| {
+            blended.push(match step {
+                Step::Splat(k) => Blended::Gaussian(splats[k].gaussian),
+                Step::Underlay(_) => Blended::Underlay,
+            });
+        });
+        blended
+    };
+    Ok(pixels(view).map(of_pixel).collect())
 }
 
-/// [`render`] with every pixel blending the Gaussians that it is told to: smooth in all parameters.
-pub fn render_chosen(
+/// [`render`] with every pixel blending what it is told to: smooth in all parameters.
+///
+/// # Errors
+/// As [`crate::splat::Renderer::render`].
+pub fn render_selected(
     posed: &Posed,
-    camera: &Camera,
-    settings: &RenderSettings,
-    chosen: &[Vec<usize>],
-) -> Vec<[f64; 5]> {
-    let splats = splats(posed, camera, settings, Cutoffs::STOCK);
-    let background = DVec3::from_array(settings.background.map(f64::from));
-    std::iter::zip(pixels(camera), chosen)
-        .map(|(pixel, chosen)| blend(chosen.iter().filter_map(|&i| splats[i].as_ref()), pixel, background))
-        .collect()
+    view: &View,
+    selected: &[Vec<Blended>],
+) -> Result<Vec<[f64; 5]>, SceneError> {
+    view.check(posed)?;
+    let splats = splats(posed, view, Cutoffs::STOCK);
+    let background = DVec3::from_array(view.background.map(f64::from));
+    let of_pixel = |(pixel, blended): ([usize; 2], &Vec<Blended>)| {
+        let parts = blended.iter().filter_map(|blended| match blended {
+            Blended::Gaussian(i) => {
+                splats[*i].as_ref().map(|splat| (splat.colour, splat.alpha(pixel), splat.depth))
+            }
+            Blended::Underlay => underlay_at(view, pixel).map(|own| (own.colour, own.coverage, own.depth)),
+        });
+        blend(parts, background)
+    };
+    Ok(std::iter::zip(pixels(view), selected).map(of_pixel).collect())
 }
 
-fn pixels(camera: &Camera) -> impl Iterator<Item = [usize; 2]> {
-    let (width, height) = (camera.width as usize, camera.height as usize);
+fn pixels(view: &View) -> impl Iterator<Item = [usize; 2]> + use<> {
+    let [width, height] = view.size();
     (0..height).flat_map(move |y| (0..width).map(move |x| [x, y]))
 }
 
-fn part(splats: &[Splat], pixel: [usize; 2], pane: &Pane) -> Parted {
-    let mut parted = Parted { chosen: Vec::new(), front: 0 };
-    let front =
-        walk(splats.iter(), pixel, Some(pane), Cutoffs::STOCK, |k, _| parted.chosen.push(splats[k].gaussian));
-    Parted { front, ..parted }
+/// What a pixel shows of an underlay.
+#[derive(Clone, Copy)]
+struct UnderlayPixel {
+    colour: DVec3,
+    coverage: f64,
+    /// Gaussians at it or beyond lie behind.
+    depth: f64,
 }
 
-/// Visits the splats that a pixel blends, front to back: position in the sequence, and alpha times the transmittance
-/// before it, in which a pane counts as it is passed. Returns how many lie in front of the pane.
+/// `None` where nothing is covered.
+fn underlay_at(view: &View, [x, y]: [usize; 2]) -> Option<UnderlayPixel> {
+    let Underlay { colour, coverage, depth } = view.underlay?;
+    let (colour, coverage) = (colour.at(x, y).map(f64::from), f64::from(coverage.at(x, y)));
+    // The lesser of a NaN and a number is the number.
+    let depth = f64::from(depth.at(x, y).min(f32::MAX));
+    (coverage > 0.0).then_some(UnderlayPixel { colour: DVec3::from_array(colour), coverage, depth })
+}
+
+/// One of the things that a walk meets.
+enum Step {
+    /// Position in the sequence.
+    Splat(usize),
+    Underlay(UnderlayPixel),
+}
+
+/// Visits what a pixel blends, front to back, each with its alpha times the transmittance before it. An underlay is blended
+/// before the first splat that does not lie in front of it, or at the end, however little light is left; splats are not.
 fn walk<'a>(
-    splats: impl Iterator<Item = &'a Splat>,
+    splats: impl IntoIterator<Item = &'a Splat>,
     pixel: [usize; 2],
-    mut pane: Option<&Pane>,
+    mut underlay: Option<UnderlayPixel>,
     cutoffs: Cutoffs,
-    mut visit: impl FnMut(usize, f64),
-) -> usize {
-    let (mut transmittance, mut visited, mut front) = (1.0, 0, None);
-    for (k, splat) in splats.enumerate() {
-        if let Some(passed) = pane.take_if(|pane| splat.depth as f32 >= pane.depth as f32) {
-            front = Some(visited);
+    mut visit: impl FnMut(Step, f64),
+) {
+    let mut transmittance = 1.0;
+    for (k, splat) in splats.into_iter().enumerate() {
+        if let Some(passed) = underlay.take_if(|own| splat.depth as f32 >= own.depth as f32) {
+            visit(Step::Underlay(passed), passed.coverage * transmittance);
             transmittance *= 1.0 - passed.coverage;
             if transmittance < cutoffs.transmittance {
                 break;
@@ -146,19 +147,20 @@ fn walk<'a>(
         if after < cutoffs.transmittance {
             break;
         }
-        visit(k, alpha * transmittance);
-        visited += 1;
+        visit(Step::Splat(k), alpha * transmittance);
         transmittance = after;
     }
-    front.unwrap_or(visited)
+    if let Some(left) = underlay {
+        visit(Step::Underlay(left), left.coverage * transmittance);
+    }
 }
 
-fn blend<'a>(splats: impl Iterator<Item = &'a Splat>, pixel: [usize; 2], background: DVec3) -> [f64; 5] {
+/// Parts with their colour, alpha and depth, front to back, over a background.
+fn blend(parts: impl Iterator<Item = (DVec3, f64, f64)>, background: DVec3) -> [f64; 5] {
     let (mut transmittance, mut colour, mut depth) = (1.0, DVec3::ZERO, 0.0);
-    for splat in splats {
-        let alpha = splat.alpha(pixel);
-        colour += splat.colour * (alpha * transmittance);
-        depth += splat.depth * alpha * transmittance;
+    for (own, alpha, z) in parts {
+        colour += own * (alpha * transmittance);
+        depth += z * alpha * transmittance;
         transmittance *= 1.0 - alpha;
     }
     let colour = colour + background * transmittance;

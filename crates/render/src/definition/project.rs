@@ -1,7 +1,7 @@
 //! From a Gaussian to a splat on the screen: EWA projection and colour as in Kerbl et al. 2023, in `f64`.
 
 use super::Cutoffs;
-use crate::splat::RenderSettings;
+use crate::View;
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use skinsplat_core::scene::rasterizer::{self, DEVIATIONS, LEAST_DISCRIMINANT, LOW_PASS};
@@ -46,35 +46,19 @@ impl Splat {
 }
 
 /// One per Gaussian; none for those that are not drawn.
-pub(super) fn splats(
-    posed: &Posed,
-    camera: &Camera,
-    settings: &RenderSettings,
-    cutoffs: Cutoffs,
-) -> Vec<Option<Splat>> {
-    (0..posed.len()).into_par_iter().map(|i| project(posed, i, camera, settings, cutoffs)).collect()
+pub(super) fn splats(posed: &Posed, view: &View, cutoffs: Cutoffs) -> Vec<Option<Splat>> {
+    (0..posed.len()).into_par_iter().map(|i| project(posed, i, view, cutoffs)).collect()
 }
 
 /// In drawing order: by depth in `f32` as the original, then by index.
-pub(super) fn sorted(
-    posed: &Posed,
-    camera: &Camera,
-    settings: &RenderSettings,
-    cutoffs: Cutoffs,
-) -> Vec<Splat> {
-    let mut splats: Vec<Splat> = splats(posed, camera, settings, cutoffs).into_iter().flatten().collect();
+pub(super) fn sorted(posed: &Posed, view: &View, cutoffs: Cutoffs) -> Vec<Splat> {
+    let mut splats: Vec<Splat> = splats(posed, view, cutoffs).into_iter().flatten().collect();
     splats.sort_by(|a, b| (a.depth as f32).total_cmp(&(b.depth as f32)));
     splats
 }
 
-fn project(
-    posed: &Posed,
-    i: usize,
-    camera: &Camera,
-    settings: &RenderSettings,
-    cutoffs: Cutoffs,
-) -> Option<Splat> {
-    let world = posed.means[i].as_dvec3();
+fn project(posed: &Posed, i: usize, view: &View, cutoffs: Cutoffs) -> Option<Splat> {
+    let (world, camera) = (posed.means[i].as_dvec3(), view.camera);
     let p = camera.camera_from_world.transform_point3(world);
     // The constant of the original is an f32.
     if p.z <= f64::from(0.2f32) {
@@ -82,7 +66,7 @@ fn project(
     }
     let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
     let footprint = Footprint::new(posed.factors[i].as_dmat3(), p, camera);
-    let compensation = if settings.antialiased { footprint.compensation() } else { 1.0 };
+    let compensation = if view.antialiased { footprint.compensation() } else { 1.0 };
     let opacity = f64::from(posed.opacities[i]) * compensation;
     let mean = screen_mean(p, camera);
     if !(footprint.determinant.is_finite() && mean.is_finite()) {

@@ -14,7 +14,8 @@ pub(super) const UNITS: i64 = 4096;
 
 /// Triangles are clipped this far from the image origin, pixels. With it, coordinates stay below 2^30 units and edge
 /// functions below 2^62.
-const GUARD_BAND: f64 = 4.0 * MAX_IMAGE_SIDE as f64;
+const GUARD_BAND: f64 = (1 << 17) as f64;
+const _: () = assert!(GUARD_BAND > 2.0 * MAX_IMAGE_SIDE as f64);
 
 /// A linear function of pixel coordinates.
 #[derive(Clone, Copy, Debug)]

@@ -8,11 +8,12 @@
 //! splats. A splat's mean and conic need nothing but the moments of `dL/d ln α` over the pixels, and within a block
 //! pixel coordinates are the constants 0 to 3.
 
-use super::blend::{BETWEEN_CHECKS, COLUMN, LEAST_TRANSMITTANCE, MAX_ALPHA, ROW, uncapped_alpha};
+use super::accumulator::{LEAST_TRANSMITTANCE, MAX_ALPHA};
+use super::blend::{BETWEEN_CHECKS, COLUMN, ROW, uncapped_alpha};
+use super::grid::pixels_of_block;
 use super::lanes::Lanes;
-use super::pane::Pane;
+use super::layer::LayerBlock;
 use super::preprocess::Splat;
-use super::reach::BLOCK;
 use super::wide::{Wide, each};
 use skinsplat_core::scene::RenderedGradient;
 
@@ -36,22 +37,18 @@ pub(super) struct BlockUpstream {
 }
 
 impl BlockUpstream {
-    /// The block whose first pixel is (`left`, `top`).
+    /// The block whose first pixel is `corner`.
     #[inline(always)]
-    pub(super) fn load(upstream: &RenderedGradient, background: [f32; 3], [left, top]: [usize; 2]) -> Self {
-        let (width, height) = (upstream.image.width(), upstream.image.height());
+    pub(super) fn load(upstream: &RenderedGradient, background: [f32; 3], corner: [usize; 2]) -> Self {
         let mut block = Self { colour: [[0.0; 16]; 3], behind: [0.0; 16] };
-        for y in top..height.min(top + BLOCK) {
-            for x in left..width.min(left + BLOCK) {
-                let (pixel, lane) = (y * width + x, (y - top) * BLOCK + x - left);
-                let [r, g, b] = upstream.image.pixels()[pixel];
-                let alpha = upstream.alpha.as_ref().map_or(0.0, |alpha| alpha.values()[pixel]);
-                for (row, value) in block.colour.iter_mut().zip([r, g, b]) {
-                    row[lane] = value;
-                }
-                block.behind[lane] = r * background[0] + g * background[1] + b * background[2] - alpha;
+        pixels_of_block(corner, [upstream.image.width(), upstream.image.height()], |pixel, lane| {
+            let [r, g, b] = upstream.image.pixels()[pixel];
+            let alpha = upstream.alpha.as_ref().map_or(0.0, |alpha| alpha.values()[pixel]);
+            for (row, value) in block.colour.iter_mut().zip([r, g, b]) {
+                row[lane] = value;
             }
-        }
+            block.behind[lane] = r * background[0] + g * background[1] + b * background[2] - alpha;
+        });
         block
     }
 
@@ -90,7 +87,7 @@ impl Shares {
         [left, top]: [usize; 2],
         list: &[u16],
         splats: &[Splat],
-        pane: &mut impl Pane,
+        layer: &mut impl LayerBlock,
         open: &mut [f32; 16],
     ) {
         if self.shares.len() < list.len() {
@@ -108,9 +105,9 @@ impl Shares {
                 break;
             }
             for &i in run {
-                let paint = &splats[usize::from(i)].paint;
-                pane.dim(l, paint.depth, &mut transmittance);
-                let uncapped = uncapped_alpha(paint, x, y);
+                let screen = &splats[usize::from(i)].screen;
+                layer.dim(l, screen.depth, &mut transmittance);
+                let uncapped = uncapped_alpha(screen, x, y);
                 let after = uncapped.min(n(MAX_ALPHA)).neg_mul_add(transmittance, transmittance);
                 let enough = after.at_least(n(LEAST_TRANSMITTANCE));
                 let uncapped = enough.keep(uncapped);
@@ -137,7 +134,7 @@ pub(super) struct BlockAdjoint<'a, P> {
     /// Uncapped alphas above this pass no derivative on.
     pub(super) greatest_alpha: f32,
     /// What lies among the splats and was not crossed yet.
-    pub(super) pane: &'a mut P,
+    pub(super) layer: &'a mut P,
 }
 
 /// Vectors of pixels of up to sixteen splats, before they are summed.
@@ -150,7 +147,7 @@ struct Pending {
     places: [u32; 16],
 }
 
-impl<P: Pane> BlockAdjoint<'_, P> {
+impl<P: LayerBlock> BlockAdjoint<'_, P> {
     /// Adds to `sums` what the block's pixels ask of its splats.
     #[inline(always)]
     pub(super) fn run<L: Lanes>(self, l: L, upstream: &mut BlockUpstream, sums: &mut [SplatSums]) {
@@ -161,19 +158,19 @@ impl<P: Pane> BlockAdjoint<'_, P> {
         for (shares, indices) in shares[..*count].rchunks(16).zip(splats[..*count].rchunks(16)) {
             for (k, (share, &i)) in shares.iter().zip(indices).enumerate().rev() {
                 let i = usize::from(i);
-                let paint = &self.splats[i].paint;
-                self.pane.cross_back(l, paint.depth, &colour, &mut after);
+                let screen = &self.splats[i].screen;
+                self.layer.cross_back(l, screen.depth, &colour, &mut after);
                 let uncapped = Wide::load(l, &share.uncapped);
                 let transmittance = Wide::load(l, &share.transmittance);
                 let alpha = uncapped.min(n(MAX_ALPHA));
-                let [r, g, b] = each(paint.colour, n);
+                let [r, g, b] = each(screen.colour, n);
                 let along = colour[2].mul_add(b, colour[1].mul_add(g, colour[0] * r));
                 let difference = along - after;
                 let free = n(self.greatest_alpha).at_least(uncapped).keep(uncapped);
                 pending.power[k] = (free * transmittance * difference).store();
                 pending.weight[k] = (alpha * transmittance).store();
-                pending.mean[0][k] = paint.mean[0];
-                pending.mean[1][k] = paint.mean[1];
+                pending.mean[0][k] = screen.mean[0];
+                pending.mean[1][k] = screen.mean[1];
                 pending.places[k] = self.places[i];
                 after = alpha.mul_add(difference, after);
             }

@@ -1,14 +1,14 @@
 //! First phase on the way back: what strips ask of a chunk's splats becomes derivatives by Gaussian.
 
-use super::Derivatives;
 use super::backward_blend::{COLOUR_SUMS, SplatSums};
 use super::backward_colour::{self, Touched};
 use super::backward_project::{Source, SourceGradient};
 use super::bin::{Bins, splat_of};
 use super::colour;
+use super::derivatives::Derivatives;
 use super::lanes::{Kernel, Lanes};
 use super::preprocess::{Group, LANES};
-use super::project::View;
+use super::project::Projection;
 use super::wide::{Mask, Wide, each};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
@@ -72,7 +72,7 @@ impl<'a> Output<'a> {
 /// Gathers the sums of the splats of a chunk and takes them back to its Gaussians.
 pub(super) struct BackwardGaussians<'a, 'b> {
     pub(super) posed: &'a Posed<'a>,
-    pub(super) view: &'a View,
+    pub(super) projection: &'a Projection,
     pub(super) derivatives: Derivatives,
     /// Number of the chunk's first Gaussian.
     pub(super) first: usize,
@@ -152,7 +152,7 @@ impl BackwardGaussians<'_, '_> {
             opacity: load(group.opacities),
         };
         let [power, x, y, xx, xy, yy, ..] = sums;
-        gradient = source.adjoint(self.view, [power, x, y, xx, xy, yy], self.derivatives);
+        gradient = source.adjoint(self.projection, [power, x, y, xx, xy, yy], self.derivatives);
         if touched == 0 {
             self.out.sh[sh].fill([0.0; 3]);
         } else {
@@ -178,7 +178,7 @@ impl BackwardGaussians<'_, '_> {
         rgb: [Wide<L>; 3],
         touched: Touched,
     ) -> [Wide<L>; 3] {
-        let direction = colour::direction(mean, self.view.position, frames);
+        let direction = colour::direction(mean, self.projection.position, frames);
         let basis = colour::basis(direction.unit);
         let coefficients = self.coefficients();
         let sh = &self.posed.sh[(self.first + start) * coefficients..][..count * coefficients];
@@ -194,7 +194,7 @@ impl BackwardGaussians<'_, '_> {
     }
 
     fn coefficients(&self) -> usize {
-        (self.posed.sh_degree + 1).pow(2)
+        colour::sh_count(self.posed)
     }
 }
 

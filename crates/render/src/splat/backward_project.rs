@@ -1,9 +1,9 @@
 //! The adjoint of the projection: from a splat's moments to its Gaussian's mean, factor and opacity.
 
-use super::Derivatives;
+use super::derivatives::Derivatives;
 use super::lanes::Lanes;
 use super::project::{
-    LEAST_COMPENSATION, LOW_PASS, Projected, ScreenAxis, View, affine, dot, project, screen_axis,
+    LEAST_COMPENSATION, LOW_PASS, Projected, Projection, ScreenAxis, affine, dot, project, screen_axis,
 };
 use super::wide::Wide;
 
@@ -38,24 +38,26 @@ impl<L: Lanes> Source<L> {
     #[inline(always)]
     pub(super) fn adjoint(
         &self,
-        view: &View,
+        projection: &Projection,
         moments: Moments<L>,
         derivatives: Derivatives,
     ) -> SourceGradient<L> {
         let n = |value: f32| self.opacity.constant(value);
-        let projected = project(view, self.mean, self.factor, self.opacity);
+        let projected = project(projection, self.mean, self.factor, self.opacity);
         let inverse_z = n(1.0) / projected.depth;
         let axes = [
-            screen_axis(view, 0, self.mean, self.factor, inverse_z),
-            screen_axis(view, 1, self.mean, self.factor, inverse_z),
+            screen_axis(projection, 0, self.mean, self.factor, inverse_z),
+            screen_axis(projection, 1, self.mean, self.factor, inverse_z),
         ];
 
         let [power, x, y, ..] = moments;
         let [a, b, c] = projected.conic;
-        let screen =
-            [-a.mul_add(x, b * y) * n(0.5 * view.size[0]), -b.mul_add(x, c * y) * n(0.5 * view.size[1])];
+        let screen = [
+            -a.mul_add(x, b * y) * n(0.5 * projection.size[0]),
+            -b.mul_add(x, c * y) * n(0.5 * projection.size[1]),
+        ];
         let mut covariance = covariance_from_conic(&projected, moments, derivatives);
-        if view.antialiased {
+        if projection.antialiased {
             let more = compensation(&projected, &axes, power, derivatives);
             for k in 0..3 {
                 covariance[k] = covariance[k] + more[k];
@@ -74,8 +76,8 @@ impl<L: Lanes> Source<L> {
         let mut mean = [n(0.0); 3];
         for (k, by_factor) in [du, dv].into_iter().enumerate() {
             let row = transformed(self.factor, by_factor);
-            self.add_jacobian(view, k, &axes[k], inverse_z, row, derivatives, &mut mean);
-            self.add_position(view, k, projected.depth, screen[k], &mut mean);
+            self.add_jacobian(projection, k, &axes[k], inverse_z, row, derivatives, &mut mean);
+            self.add_position(projection, k, projected.depth, screen[k], &mut mean);
         }
         // α is the product of the opacity and what does not depend on it.
         SourceGradient { mean, factor, opacity: power / self.opacity, screen, radius: projected.radius }
@@ -85,7 +87,7 @@ impl<L: Lanes> Source<L> {
     #[inline(always)]
     fn add_jacobian(
         &self,
-        view: &View,
+        projection: &Projection,
         k: usize,
         axis: &ScreenAxis<L>,
         inverse_z: Wide<L>,
@@ -94,9 +96,9 @@ impl<L: Lanes> Source<L> {
         mean: &mut [Wide<L>; 3],
     ) {
         let n = |value: f32| inverse_z.constant(value);
-        let (own, forward) = (along(view.rows[k], row), along(view.rows[2], row));
-        let scale = n(view.focal[k]) * inverse_z * inverse_z;
-        let limit = n(view.limit[k]);
+        let (own, forward) = (along(projection.rows[k], row), along(projection.rows[2], row));
+        let scale = n(projection.focal[k]) * inverse_z * inverse_z;
+        let limit = n(projection.limit[k]);
         let free = axis.slope.at_least(-limit).and(limit.at_least(axis.slope));
         // -f x/z²: of x/z, beyond the limit, nothing moves; the original forgets that for z.
         let power = match derivatives {
@@ -106,20 +108,27 @@ impl<L: Lanes> Source<L> {
         let by_z = scale * (power * axis.limited).mul_add(forward, -own);
         let by_x = free.keep(-(scale * forward));
         for i in 0..3 {
-            mean[i] = by_z.mul_add(n(view.rows[2][i]), by_x.mul_add(n(view.rows[k][i]), mean[i]));
+            mean[i] = by_z.mul_add(n(projection.rows[2][i]), by_x.mul_add(n(projection.rows[k][i]), mean[i]));
         }
     }
 
     /// Through coordinate k of the position on screen, in half image sizes.
     #[inline(always)]
-    fn add_position(&self, view: &View, k: usize, z: Wide<L>, screen: Wide<L>, mean: &mut [Wide<L>; 3]) {
+    fn add_position(
+        &self,
+        projection: &Projection,
+        k: usize,
+        z: Wide<L>,
+        screen: Wide<L>,
+        mean: &mut [Wide<L>; 3],
+    ) {
         let n = |value: f32| z.constant(value);
         let w = n(1.0) / (z + n(1e-7));
         let by_clip = screen * w;
-        let by_w = by_clip * (affine(view.clip[k], self.mean) * w);
+        let by_w = by_clip * (affine(projection.clip[k], self.mean) * w);
         for i in 0..3 {
-            let clip = by_clip.mul_add(n(view.clip[k][i]), mean[i]);
-            mean[i] = by_w.neg_mul_add(n(view.rows[2][i]), clip);
+            let clip = by_clip.mul_add(n(projection.clip[k][i]), mean[i]);
+            mean[i] = by_w.neg_mul_add(n(projection.rows[2][i]), clip);
         }
     }
 }

@@ -1,16 +1,14 @@
 //! Second phase on the way back: the pixels of one strip ask something of its splats.
 
 use super::backward_blend::{BlockAdjoint, BlockUpstream, Shares, SplatSums};
-use super::bin::{Bins, Entry, STRIP_TILES, STRIP_WIDTH, sort_by_depth, splat_of};
+use super::bin::{Bins, Entry, sort_by_depth, splat_of};
+use super::grid::{BLOCKS, COLUMNS, Strip};
 use super::lanes::{Kernel, Lanes};
-use super::pane::{Layer, Pane};
+use super::layer::{Layer, LayerBlock};
 use super::preprocess::Splat;
-use super::project::TILE;
-use super::reach::{BLOCK, COLUMNS, SEGMENT, Segment};
+use super::reach::{SEGMENT, Segment};
 use super::wide::Wide;
 use skinsplat_core::scene::RenderedGradient;
-
-const BLOCKS: usize = COLUMNS * TILE / BLOCK;
 
 /// Memory that strips reuse, one after the other.
 #[derive(Debug, Default)]
@@ -32,10 +30,7 @@ pub(super) struct Scratch {
 
 /// Sums the derivatives of a strip's pixels by splat.
 pub(super) struct BackwardStrip<'a, Y> {
-    /// Strip number in the grid, and its column and row there.
-    pub(super) strip: usize,
-    pub(super) column: usize,
-    pub(super) row: usize,
+    pub(super) strip: Strip,
     pub(super) bins: &'a [Bins],
     pub(super) splats: &'a [Splat],
     pub(super) upstream: &'a RenderedGradient,
@@ -62,7 +57,7 @@ impl<Y: Layer> Kernel for BackwardStrip<'_, Y> {
             self.load(segment - 1);
             self.advance(l, segment);
         }
-        let mut behind: Vec<Option<Y::Pane>> = vec![None; BLOCKS];
+        let mut behind: Vec<Option<Y::Block>> = vec![None; BLOCKS];
         for segment in (0..segments).rev() {
             self.load(segment);
             self.backpropagate(l, segment, &mut behind);
@@ -85,7 +80,7 @@ impl<Y: Layer> BackwardStrip<'_, Y> {
         entries.clear();
         splats.clear();
         for bins in self.bins {
-            for &entry in bins.strip(self.strip) {
+            for &entry in bins.strip(self.strip.number) {
                 entries.push(entry >> 32 << 32 | splats.len() as u64);
                 splats.push(splat_of(entry) as u32);
             }
@@ -100,12 +95,7 @@ impl<Y: Layer> BackwardStrip<'_, Y> {
         places.clear();
         places.extend(entries.iter().map(|&entry| splat_of(entry) as u32));
         let splats = places.iter().map(|&place| self.splats[splats[place as usize] as usize]);
-        loaded.load(splats, self.column * STRIP_TILES, self.row * TILE);
-    }
-
-    fn corner(&self, block: usize) -> [usize; 2] {
-        let (band, column) = (block / COLUMNS, block % COLUMNS);
-        [self.column * STRIP_WIDTH + column * BLOCK, self.row * TILE + band * BLOCK]
+        loaded.load(splats, self.strip);
     }
 
     /// Depth of a segment's first splat.
@@ -116,12 +106,12 @@ impl<Y: Layer> BackwardStrip<'_, Y> {
     /// What lies among the splats of a block from a segment on. What lies in front of the segment was crossed before:
     /// [`BackwardStrip::advance`] sees to that.
     #[inline(always)]
-    fn pane_from<L: Lanes>(&self, l: L, segment: usize, corner: [usize; 2]) -> Y::Pane {
-        let mut pane = self.layer.pane(corner);
-        if Y::Pane::PRESENT && segment > 0 {
-            pane.dim(l, self.first_depth(segment), &mut Wide::splat(l, 0.0));
+    fn layer_from<L: Lanes>(&self, l: L, segment: usize, corner: [usize; 2]) -> Y::Block {
+        let mut layer = self.layer.block(corner);
+        if Y::Block::PRESENT && segment > 0 {
+            layer.dim(l, self.first_depth(segment), &mut Wide::splat(l, 0.0));
         }
-        pane
+        layer
     }
 
     /// Finds what the loaded segment leaves open for the one that comes `next`.
@@ -133,15 +123,15 @@ impl<Y: Layer> BackwardStrip<'_, Y> {
             self.scratch.segment.list_band(l, band);
             for column in 0..COLUMNS {
                 let block = band * COLUMNS + column;
-                let corner = self.corner(block);
-                let mut pane = self.pane_from(l, next - 1, corner);
+                let corner = self.strip.corner(block);
+                let mut layer = self.layer_from(l, next - 1, corner);
                 let depth = self.first_depth(next);
                 let Scratch { segment, shares, open, .. } = &mut *self.scratch;
                 let open = &mut open[start + block];
-                shares.collect(l, corner, segment.list(column), &segment.splats, &mut pane, open);
-                if Y::Pane::PRESENT {
+                shares.collect(l, corner, segment.list(column), &segment.splats, &mut layer, open);
+                if Y::Block::PRESENT {
                     let mut left = Wide::load(l, open);
-                    pane.dim(l, depth, &mut left);
+                    layer.dim(l, depth, &mut left);
                     *open = left.store();
                 }
             }
@@ -149,14 +139,14 @@ impl<Y: Layer> BackwardStrip<'_, Y> {
     }
 
     #[inline(always)]
-    fn backpropagate<L: Lanes>(&mut self, l: L, number: usize, behind: &mut [Option<Y::Pane>]) {
+    fn backpropagate<L: Lanes>(&mut self, l: L, number: usize, behind: &mut [Option<Y::Block>]) {
         let start = number * BLOCKS;
         for band in 0..BLOCKS / COLUMNS {
             self.scratch.segment.list_band(l, band);
             for column in 0..COLUMNS {
                 let block = band * COLUMNS + column;
-                let corner = self.corner(block);
-                let mut pane = self.pane_from(l, number, corner);
+                let corner = self.strip.corner(block);
+                let mut layer = self.layer_from(l, number, corner);
                 let Scratch { places, segment, shares, open, upstream, .. } = &mut *self.scratch;
                 let list = segment.list(column);
                 if list.is_empty() {
@@ -167,15 +157,15 @@ impl<Y: Layer> BackwardStrip<'_, Y> {
                 if upstream.is_zero() {
                     continue;
                 }
-                shares.collect(l, corner, list, &segment.splats, &mut pane, &mut open[start + block]);
-                let pane = behind[block].get_or_insert_with(|| self.layer.pane(corner));
+                shares.collect(l, corner, list, &segment.splats, &mut layer, &mut open[start + block]);
+                let layer = behind[block].get_or_insert_with(|| self.layer.block(corner));
                 let adjoint = BlockAdjoint {
                     corner,
                     shares,
                     splats: &segment.splats,
                     places,
                     greatest_alpha: self.greatest_alpha,
-                    pane,
+                    layer,
                 };
                 adjoint.run(l, upstream, self.sums);
             }

@@ -4,30 +4,8 @@
 //! splats by strip; a strip then gathers its splats from all chunks, in index order, and sorts them by depth. No step
 //! depends on the number of threads, and none is serial.
 
-use super::project::TILE;
+use super::grid::{Grid, STRIP_TILES};
 use std::ops::Range;
-
-/// Width of a strip, tiles.
-pub(super) const STRIP_TILES: usize = 16;
-/// Width of a strip, pixels.
-pub(super) const STRIP_WIDTH: usize = STRIP_TILES * TILE;
-
-/// The strips of an image.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Grid {
-    pub(super) across: usize,
-    pub(super) down: usize,
-}
-
-impl Grid {
-    pub(super) fn new(tiles: [usize; 2]) -> Self {
-        Self { across: tiles[0].div_ceil(STRIP_TILES), down: tiles[1] }
-    }
-
-    pub(super) fn count(self) -> usize {
-        self.across * self.down
-    }
-}
 
 /// A splat in a strip's list: depth bits above its index, so that numeric order is drawing order. (View depths are
 /// positive, whose bits order as they do.)

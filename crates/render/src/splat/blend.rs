@@ -1,14 +1,11 @@
 //! Front-to-back blending of one 4x4-pixel block, sixteen lanes at once.
 
+use super::accumulator::{Accumulator, LEAST_TRANSMITTANCE, MAX_ALPHA};
 use super::lanes::Lanes;
-use super::pane::Pane;
-use super::preprocess::{Paint, Splat};
+use super::layer::LayerBlock;
+use super::preprocess::{ScreenGaussian, Splat};
 use super::wide::{Wide, each};
 
-/// Alpha never exceeds this.
-pub(super) const MAX_ALPHA: f32 = 0.99;
-/// A splat that would leave less transmittance than this is not blended, and the pixel is done.
-pub(super) const LEAST_TRANSMITTANCE: f32 = 1e-4;
 /// Splats between two looks at whether all pixels of the block are done.
 pub(super) const BETWEEN_CHECKS: usize = 8;
 
@@ -27,15 +24,6 @@ pub(super) struct Block {
     open: [f32; 16],
     colour: [[f32; 16]; 3],
     depth: [f32; 16],
-}
-
-/// A block in registers.
-pub(super) struct Light<L: Lanes> {
-    pub(super) transmittance: Wide<L>,
-    /// See [`Block`].
-    pub(super) open: Wide<L>,
-    pub(super) colour: [Wide<L>; 3],
-    pub(super) depth: Wide<L>,
 }
 
 /// A finished block.
@@ -72,8 +60,8 @@ impl Block {
     }
 
     #[inline(always)]
-    fn light<L: Lanes>(&self, l: L) -> Light<L> {
-        Light {
+    fn load<L: Lanes>(&self, l: L) -> Accumulator<L> {
+        Accumulator {
             transmittance: Wide::load(l, &self.transmittance),
             open: Wide::load(l, &self.open),
             colour: each(self.colour, |c| Wide::load(l, &c)),
@@ -82,22 +70,22 @@ impl Block {
     }
 
     #[inline(always)]
-    fn keep<L: Lanes>(&mut self, light: &Light<L>) {
-        self.transmittance = light.transmittance.store();
-        self.open = light.open.store();
-        self.colour = each(light.colour, Wide::store);
-        self.depth = light.depth.store();
+    fn keep<L: Lanes>(&mut self, sums: &Accumulator<L>) {
+        self.transmittance = sums.transmittance.store();
+        self.open = sums.open.store();
+        self.colour = each(sums.colour, Wide::store);
+        self.depth = sums.depth.store();
     }
 
-    /// Blends what is left of a pane behind all splats.
+    /// Blends what is left of a layer behind all splats.
     #[inline(always)]
-    pub(super) fn finish<L: Lanes>(&mut self, l: L, pane: &mut impl Pane) {
-        let mut light = self.light(l);
-        pane.cross(l, f32::INFINITY, &mut light);
-        self.keep(&light);
+    pub(super) fn finish<L: Lanes>(&mut self, l: L, layer: &mut impl LayerBlock) {
+        let mut sums = self.load(l);
+        layer.cross(l, f32::INFINITY, &mut sums);
+        self.keep(&sums);
     }
 
-    /// Blends the listed splats, in order, and the pane among them, into the block whose first pixel is (`left`, `top`).
+    /// Blends the listed splats, in order, and the layer among them, into the block whose first pixel is (`left`, `top`).
     #[inline(always)]
     pub(super) fn blend<L: Lanes>(
         &mut self,
@@ -105,50 +93,50 @@ impl Block {
         [left, top]: [usize; 2],
         list: &[u16],
         splats: &[Splat],
-        pane: &mut impl Pane,
+        layer: &mut impl LayerBlock,
     ) {
         let n = |value: f32| Wide::splat(l, value);
         let x = Wide::load(l, &COLUMN) + n(left as f32);
         let y = Wide::load(l, &ROW) + n(top as f32);
-        let mut light = self.light(l);
+        let mut sums = self.load(l);
         for run in list.chunks(BETWEEN_CHECKS) {
-            if !n(0.0).less(light.open).any() {
+            if !n(0.0).less(sums.open).any() {
                 break;
             }
             for &i in run {
-                let paint = &splats[usize::from(i)].paint;
-                pane.cross(l, paint.depth, &mut light);
-                let alpha = uncapped_alpha(paint, x, y).min(n(MAX_ALPHA));
+                let screen = &splats[usize::from(i)].screen;
+                layer.cross(l, screen.depth, &mut sums);
+                let alpha = uncapped_alpha(screen, x, y).min(n(MAX_ALPHA));
                 // Without a branch: pixels finish at different splats, which no processor predicts.
-                let after = alpha.neg_mul_add(light.open, light.open);
+                let after = alpha.neg_mul_add(sums.open, sums.open);
                 let enough = after.at_least(n(LEAST_TRANSMITTANCE));
-                let weight = enough.keep(alpha * light.open);
-                light.open = enough.keep(after);
-                light.transmittance = enough.select(after, light.transmittance);
-                let [red, green, blue] = &mut light.colour;
-                *red = weight.mul_add(n(paint.colour[0]), *red);
-                *green = weight.mul_add(n(paint.colour[1]), *green);
-                *blue = weight.mul_add(n(paint.colour[2]), *blue);
-                light.depth = weight.mul_add(n(paint.depth), light.depth);
+                let weight = enough.keep(alpha * sums.open);
+                sums.open = enough.keep(after);
+                sums.transmittance = enough.select(after, sums.transmittance);
+                let [red, green, blue] = &mut sums.colour;
+                *red = weight.mul_add(n(screen.colour[0]), *red);
+                *green = weight.mul_add(n(screen.colour[1]), *green);
+                *blue = weight.mul_add(n(screen.colour[2]), *blue);
+                sums.depth = weight.mul_add(n(screen.depth), sums.depth);
             }
         }
-        self.keep(&light);
+        self.keep(&sums);
     }
 }
 
 /// `opacity 2^-q` where 0 <= q <= reach, else 0; so a q that rounding made negative is skipped, as is NaN.
 #[inline(always)]
-pub(super) fn uncapped_alpha<L: Lanes>(paint: &Paint, x: Wide<L>, y: Wide<L>) -> Wide<L> {
+pub(super) fn uncapped_alpha<L: Lanes>(screen: &ScreenGaussian, x: Wide<L>, y: Wide<L>) -> Wide<L> {
     let n = |value: f32| x.constant(value);
-    let [a, b, c] = each(paint.conic, n);
-    let (dx, dy) = (x - n(paint.mean[0]), y - n(paint.mean[1]));
+    let [a, b, c] = each(screen.conic, n);
+    let (dx, dy) = (x - n(screen.mean[0]), y - n(screen.mean[1]));
     let q = dx.mul_add(a.mul_add(dx, b * dy), c * dy * dy);
-    q.in_range(n(paint.reach)).keep(n(paint.opacity) * q.exp2_negated())
+    q.in_range(n(screen.reach)).keep(n(screen.opacity) * q.exp2_negated())
 }
 
 /// The alpha of a splat at one pixel.
 #[cfg(test)]
-pub(super) fn alpha_at(paint: &Paint, x: f32, y: f32) -> f32 {
+pub(super) fn alpha_at(screen: &ScreenGaussian, x: f32, y: f32) -> f32 {
     let l = super::lanes::Arrays;
-    uncapped_alpha(paint, Wide::splat(l, x), Wide::splat(l, y)).store()[0].min(MAX_ALPHA)
+    uncapped_alpha(screen, Wide::splat(l, x), Wide::splat(l, y)).store()[0].min(MAX_ALPHA)
 }

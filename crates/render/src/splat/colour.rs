@@ -2,7 +2,12 @@
 
 use super::lanes::Lanes;
 use super::wide::{Wide, each};
-use skinsplat_core::scene::ColourClamp;
+use skinsplat_core::scene::{ColourClamp, Posed};
+
+/// SH coefficients per Gaussian.
+pub(super) fn sh_count(posed: &Posed) -> usize {
+    (posed.sh_degree + 1).pow(2)
+}
 
 const C0: f32 = 0.282_094_791_773_878_14;
 pub(super) const C1: f32 = 0.488_602_511_902_919_9;

@@ -7,8 +7,8 @@
 use super::blend::alpha_at;
 use super::colour;
 use super::lanes::Arrays;
-use super::preprocess::Paint;
-use super::project::{Projected, View, project};
+use super::preprocess::ScreenGaussian;
+use super::project::{Projected, Projection, project};
 use super::wide::Wide;
 use glam::{DMat3, DMat4, DQuat, DVec3, Mat3};
 use serde_json::Value;
@@ -59,11 +59,11 @@ fn wide(value: f32) -> Wide<Arrays> {
 }
 
 fn project_case(case: &Value, antialiased: bool) -> Projected<f32> {
-    let view = View::new(&camera_of(case), antialiased);
+    let projection = Projection::new(&camera_of(case), antialiased);
     let mean = numbers::<3>(&case["mean"]).map(|v| v as f32);
     let factor: Mat3 = factor_of(case).as_mat3();
     let factor = factor.to_cols_array_2d().map(|column| column.map(wide));
-    let projected = project(&view, mean.map(wide), factor, wide(number(&case["opacity"]) as f32));
+    let projected = project(&projection, mean.map(wide), factor, wide(number(&case["opacity"]) as f32));
     projected.map(|row| row.store()[0])
 }
 
@@ -149,12 +149,12 @@ fn colours_have_the_reference_values_at_every_degree() {
 fn alphas_have_the_reference_values() {
     let mut drawn = 0;
     for (i, case) in cases().iter().enumerate() {
-        let paint = Paint::new(&project_case(case, false), [0.0; 3]);
+        let screen = ScreenGaussian::new(&project_case(case, false), [0.0; 3]);
         for pixel in case["alpha"].as_array().unwrap() {
             let [x, y] = numbers::<2>(&pixel["pixel"]).map(|v| v as f32);
             let expected = if pixel["skipped"].as_bool().unwrap() { 0.0 } else { number(&pixel["alpha"]) };
             // An f32 position near 1000 is known to 6e-5 pixels; alpha changes by up to 1 per pixel.
-            close("alpha", i, alpha_at(&paint, x, y), expected, 1.0, 1e-4);
+            close("alpha", i, alpha_at(&screen, x, y), expected, 1.0, 1e-4);
             drawn += usize::from(expected > 0.0);
         }
     }

@@ -3,6 +3,8 @@
 //! Every operation is elementwise and correctly rounded (multiply-add is fused everywhere, also in the portable
 //! version), so an image does not depend on the machine's vector width.
 
+use pulp::Arch;
+
 /// Operations on sixteen `f32` lanes. Comparisons with NaN are false.
 pub(super) trait Lanes: Copy {
     /// Sixteen numbers.
@@ -66,74 +68,14 @@ pub(super) trait Kernel {
     fn run<L: Lanes>(self, lanes: L) -> Self::Output;
 }
 
-/// A set of vector instructions, narrowest first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum SimdLevel {
-    /// No assumption about the processor.
-    Portable,
-    /// x86-64 with AVX2 and FMA.
-    Avx2,
-    /// x86-64 with AVX-512 F, BW, CD, DQ and VL.
-    Avx512,
-}
-
-impl SimdLevel {
-    /// The widest set that this processor has.
-    pub fn detected() -> Self {
-        [Self::Avx512, Self::Avx2]
-            .into_iter()
-            .find(|&l| Simd::of_level(l).is_some())
-            .unwrap_or(Self::Portable)
-    }
-
-    /// Name for reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Portable => "portable",
-            Self::Avx2 => "AVX2",
-            Self::Avx512 => "AVX-512",
-        }
-    }
-}
-
-/// A set of vector instructions that this processor has.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Simd {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2(pulp::x86::V3),
-    #[cfg(target_arch = "x86_64")]
-    Avx512(pulp::x86::V4),
-}
-
-impl Simd {
-    /// The widest set that this processor has.
-    pub(super) fn detect() -> Self {
-        [SimdLevel::Avx512, SimdLevel::Avx2].into_iter().find_map(Self::of_level).unwrap_or(Self::Portable)
-    }
-
-    /// A chosen set, if this processor has it.
-    pub(super) fn of_level(level: SimdLevel) -> Option<Self> {
-        match level {
-            SimdLevel::Portable => Some(Self::Portable),
-            #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx2 => pulp::x86::V3::try_new().map(Self::Avx2),
-            #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx512 => pulp::x86::V4::try_new().map(Self::Avx512),
-            #[cfg(not(target_arch = "x86_64"))]
-            _ => None,
-        }
-    }
-
-    /// Runs a kernel compiled for these instructions.
-    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        match self {
-            Self::Portable => kernel.run(Arrays),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(simd) => simd.vectorize(OnLanes { kernel, lanes: simd }),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(simd) => simd.vectorize(OnLanes { kernel, lanes: simd }),
-        }
+/// Runs a kernel compiled for chosen instructions.
+pub(super) fn run<K: Kernel>(arch: Arch, kernel: K) -> K::Output {
+    match arch {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(lanes) => lanes.vectorize(OnLanes { kernel, lanes }),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(lanes) => lanes.vectorize(OnLanes { kernel, lanes }),
+        _ => kernel.run(Arrays),
     }
 }
 

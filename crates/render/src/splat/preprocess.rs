@@ -1,9 +1,10 @@
 //! First phase: a chunk of Gaussians becomes splats, entered into the strips that they reach.
 
-use super::bin::{Bins, Grid};
+use super::bin::Bins;
 use super::colour;
+use super::grid::Grid;
 use super::lanes::{Kernel, Lanes};
-use super::project::{Ellipse, HALF_LOG2_E, Projected, View, project};
+use super::project::{Ellipse, HALF_LOG2_E, Projected, Projection, project};
 use super::wide::{Wide, each};
 use skinsplat_core::scene::Posed;
 
@@ -13,7 +14,7 @@ pub(super) const LANES: usize = 16;
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub(super) struct Splat {
-    pub(super) paint: Paint,
+    pub(super) screen: ScreenGaussian,
     pub(super) ellipse: Ellipse<f32>,
     /// Tile columns that it may touch, half open.
     pub(super) columns: [u16; 2],
@@ -21,7 +22,7 @@ pub(super) struct Splat {
 
 /// What blending reads of a splat.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Paint {
+pub(super) struct ScreenGaussian {
     /// Pixel position; pixel i has its centre at i.
     pub(super) mean: [f32; 2],
     /// `alpha = opacity 2^-(a dx² + b dx dy + c dy²)`.
@@ -33,7 +34,7 @@ pub(super) struct Paint {
     pub(super) depth: f32,
 }
 
-impl Paint {
+impl ScreenGaussian {
     #[inline(always)]
     pub(super) fn new(p: &Projected<f32>, colour: [f32; 3]) -> Self {
         let [a, b, c] = p.conic;
@@ -51,7 +52,7 @@ impl Paint {
 /// Projects the Gaussians `first..first + splats.len()`; the visible ones come out at the front of `splats`.
 pub(super) struct Preprocess<'a> {
     pub(super) posed: &'a Posed<'a>,
-    pub(super) view: &'a View,
+    pub(super) projection: &'a Projection,
     pub(super) grid: Grid,
     pub(super) first: usize,
     pub(super) splats: &'a mut [Splat],
@@ -63,16 +64,16 @@ impl Kernel for Preprocess<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) {
-        let Self { posed, view, grid, first, splats, bins } = self;
-        let coefficients = (posed.sh_degree + 1).pow(2);
+        let Self { posed, projection, grid, first, splats, bins } = self;
+        let coefficients = colour::sh_count(posed);
         let mut written = 0;
         bins.clear();
         for start in (0..splats.len()).step_by(LANES) {
             let count = LANES.min(splats.len() - start);
             let base = first + start;
             let group = Group::load(posed, base, count);
-            let projected = group.project(l, view).map(|row| row.store());
-            let basis = each(group.basis(l, view), Wide::store);
+            let projected = group.project(l, projection).map(|row| row.store());
+            let basis = each(group.basis(l, projection), Wide::store);
             let mut visible = 0_u16;
             for lane in 0..count {
                 if projected.visible[lane] == 0.0 {
@@ -87,7 +88,7 @@ impl Kernel for Preprocess<'_> {
                 let tiles = each(p.tiles, |t| t as u16);
                 let colour = colour::clamped(colour, posed.colour_clamp);
                 splats[written] = Splat {
-                    paint: Paint::new(&p, colour),
+                    screen: ScreenGaussian::new(&p, colour),
                     ellipse: p.ellipse,
                     columns: [tiles[0], tiles[1]],
                 };
@@ -128,17 +129,17 @@ impl Group {
     }
 
     #[inline(always)]
-    fn project<L: Lanes>(&self, l: L, view: &View) -> Projected<Wide<L>> {
+    fn project<L: Lanes>(&self, l: L, projection: &Projection) -> Projected<Wide<L>> {
         let load = |row: [f32; LANES]| Wide::load(l, &row);
         let factors = each(self.factors, |column| each(column, load));
-        project(view, each(self.means, load), factors, load(self.opacities))
+        project(projection, each(self.means, load), factors, load(self.opacities))
     }
 
     #[inline(always)]
-    fn basis<L: Lanes>(&self, l: L, view: &View) -> [Wide<L>; 16] {
+    fn basis<L: Lanes>(&self, l: L, projection: &Projection) -> [Wide<L>; 16] {
         let load = |row: [f32; LANES]| Wide::load(l, &row);
         let frames = self.frames.map(|frames| each(frames, |column| each(column, load)));
-        colour::basis(colour::direction(each(self.means, load), view.position, frames).unit)
+        colour::basis(colour::direction(each(self.means, load), projection.position, frames).unit)
     }
 }
 

@@ -3,12 +3,11 @@
 //!
 //! Sixteen Gaussians at a time, without branches.
 
+use super::grid::TILE;
 use super::lanes::Lanes;
 use super::wide::{Wide, each};
 use glam::DMat4;
 use skinsplat_core::scene::{Camera, rasterizer};
-
-pub(super) use rasterizer::TILE;
 
 const NEAR: f32 = rasterizer::NEAR as f32;
 const JACOBIAN_LIMIT: f32 = rasterizer::JACOBIAN_LIMIT as f32;
@@ -26,7 +25,7 @@ const MAX_OPACITY: f32 = 1e30;
 
 /// The camera in the form in which the kernels use it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View {
+pub(super) struct Projection {
     /// First three rows of the world-to-camera transform.
     pub(super) rows: [[f32; 4]; 3],
     /// x and y rows of projection times world-to-camera.
@@ -42,7 +41,7 @@ pub(super) struct View {
     pub(super) antialiased: bool,
 }
 
-impl View {
+impl Projection {
     /// The half fields of view are `size / (2 focal)` also where the principal point is off centre, as in the original
     /// (which knows centred ones only): an off-centre principal point moves the projected means and nothing else.
     pub(super) fn new(camera: &Camera, antialiased: bool) -> Self {
@@ -78,7 +77,7 @@ pub(super) struct Projected<T> {
     pub(super) visible: T,
     /// Pixel position in the original's frame: pixel i has its centre at i.
     pub(super) mean: [T; 2],
-    /// View depth.
+    /// Projection depth.
     pub(super) depth: T,
     /// xx, xy, yy of the screen covariance with low-pass, pixels².
     pub(super) covariance: [T; 3],
@@ -136,17 +135,17 @@ impl<T> Projected<T> {
 /// Projects Gaussians with the factor M of their covariance (columns, Σ = M Mᵀ).
 #[inline(always)]
 pub(super) fn project<L: Lanes>(
-    view: &View,
+    projection: &Projection,
     mean: [Wide<L>; 3],
     factor: [[Wide<L>; 3]; 3],
     opacity: Wide<L>,
 ) -> Projected<Wide<L>> {
     let number = |value: f32| opacity.constant(value);
-    let z = affine(view.rows[2], mean);
+    let z = affine(projection.rows[2], mean);
     let inverse_z = number(1.0) / z;
     let axes = [
-        screen_axis(view, 0, mean, factor, inverse_z).factor,
-        screen_axis(view, 1, mean, factor, inverse_z).factor,
+        screen_axis(projection, 0, mean, factor, inverse_z).factor,
+        screen_axis(projection, 1, mean, factor, inverse_z).factor,
     ];
     let (bare_xx, xy, bare_yy) = (dot(axes[0], axes[0]), dot(axes[0], axes[1]), dot(axes[1], axes[1]));
     let (xx, yy) = (bare_xx + number(LOW_PASS), bare_yy + number(LOW_PASS));
@@ -158,17 +157,17 @@ pub(super) fn project<L: Lanes>(
     let largest =
         middle + (middle * middle - determinant).max(number(rasterizer::LEAST_DISCRIMINANT as f32)).sqrt();
     let radius = (number(rasterizer::DEVIATIONS as f32) * largest.sqrt()).ceil();
-    let mean = [pixel_position(view, 0, mean, z), pixel_position(view, 1, mean, z)];
+    let mean = [pixel_position(projection, 0, mean, z), pixel_position(projection, 1, mean, z)];
 
     let ratio = ((bare_xx * bare_yy - xy * xy) * inverse).max(number(LEAST_COMPENSATION));
-    let opacity = if view.antialiased { opacity * ratio.sqrt() } else { opacity };
+    let opacity = if projection.antialiased { opacity * ratio.sqrt() } else { opacity };
     let bounded = opacity.min(number(MAX_OPACITY));
     let reach = (number(255.0) * bounded).log2();
     // The power at a pixel is a difference of terms as large as xx yy / det times itself; each is off by a few ulp.
     let slack = (xx * yy * inverse).mul_add(number(4e-6), number(1.0 + 1e-4));
     let square = reach.mul_add(slack, number(1e-4)) * number(1.0 / HALF_LOG2_E);
-    let [x0, x1] = tile_range(view, 0, mean[0], radius, (square * xx).sqrt());
-    let [y0, y1] = tile_range(view, 1, mean[1], radius, (square * yy).sqrt());
+    let [x0, x1] = tile_range(projection, 0, mean[0], radius, (square * xx).sqrt());
+    let [y0, y1] = tile_range(projection, 1, mean[1], radius, (square * yy).sqrt());
     let inverse_yy = number(1.0) / yy;
     let half_width_squared = square * determinant * inverse_yy;
     let ellipse = Ellipse {
@@ -216,43 +215,44 @@ pub(super) struct ScreenAxis<L: Lanes> {
 
 #[inline(always)]
 pub(super) fn screen_axis<L: Lanes>(
-    view: &View,
+    projection: &Projection,
     k: usize,
     mean: [Wide<L>; 3],
     factor: [[Wide<L>; 3]; 3],
     inverse_z: Wide<L>,
 ) -> ScreenAxis<L> {
     let number = |value: f32| inverse_z.constant(value);
-    let limit = number(view.limit[k]);
-    let slope = affine(view.rows[k], mean) * inverse_z;
+    let limit = number(projection.limit[k]);
+    let slope = affine(projection.rows[k], mean) * inverse_z;
     let limited = slope.max(-limit).min(limit);
-    let scale = number(view.focal[k]) * inverse_z;
-    let row =
-        each([0, 1, 2], |i| limited.neg_mul_add(number(view.rows[2][i]), number(view.rows[k][i])) * scale);
+    let scale = number(projection.focal[k]) * inverse_z;
+    let row = each([0, 1, 2], |i| {
+        limited.neg_mul_add(number(projection.rows[2][i]), number(projection.rows[k][i])) * scale
+    });
     ScreenAxis { slope, limited, row, factor: each(factor, |column| dot(row, column)) }
 }
 
 /// Pixel coordinate k. The original computes `((ndc + 1) size - 1) / 2` in f64 and rounds: the same bits as one fused
 /// multiply-add.
 #[inline(always)]
-fn pixel_position<L: Lanes>(view: &View, k: usize, mean: [Wide<L>; 3], z: Wide<L>) -> Wide<L> {
+fn pixel_position<L: Lanes>(projection: &Projection, k: usize, mean: [Wide<L>; 3], z: Wide<L>) -> Wide<L> {
     let w = z.constant(1.0) / (z + z.constant(1e-7));
-    let ndc = affine(view.clip[k], mean) * w;
-    ndc.mul_add(z.constant(0.5 * view.size[k]), z.constant(0.5 * (view.size[k] - 1.0)))
+    let ndc = affine(projection.clip[k], mean) * w;
+    ndc.mul_add(z.constant(0.5 * projection.size[k]), z.constant(0.5 * (projection.size[k] - 1.0)))
 }
 
 /// Tiles `[from, to)` along axis k that a square of `radius` around `centre` touches, by the original's formula, and no
 /// further than `extent` from the centre.
 #[inline(always)]
 fn tile_range<L: Lanes>(
-    view: &View,
+    projection: &Projection,
     k: usize,
     centre: Wide<L>,
     radius: Wide<L>,
     extent: Wide<L>,
 ) -> [Wide<L>; 2] {
     let number = |value: f32| centre.constant(value);
-    let (per_side, tiles) = (number(1.0 / TILE as f32), number(view.tiles[k] as f32));
+    let (per_side, tiles) = (number(1.0 / TILE as f32), number(projection.tiles[k] as f32));
     // The original truncates towards zero, then clamps to zero from below: the same as the floor.
     let clamped = |v: Wide<L>| (v * per_side).floor().max(number(0.0)).min(tiles);
     let [from, to] = [clamped(centre - radius), clamped(centre + radius + number((TILE - 1) as f32))];

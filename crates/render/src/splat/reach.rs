@@ -3,17 +3,12 @@
 //! In a band four pixels high the ellipse of alpha = 1/255 spans one interval of x, which has a closed form; the splat
 //! reaches the blocks whose pixel centres lie in it, within the original's tile rectangle.
 
-use super::bin::STRIP_TILES;
+use super::grid::{BLOCK, BLOCKS_PER_TILE, COLUMNS, STRIP_TILES, Strip, TILE};
 use super::lanes::Lanes;
 use super::preprocess::Splat;
-use super::project::{SAFETY, TILE};
+use super::project::SAFETY;
 use super::wide::Wide;
 
-/// Side of a block, pixels.
-pub(super) const BLOCK: usize = 4;
-/// Blocks across a strip.
-pub(super) const COLUMNS: usize = STRIP_TILES * BLOCKS_PER_TILE;
-const BLOCKS_PER_TILE: usize = TILE / BLOCK;
 /// Splats that are taken at a time: bounds the lists' memory, and lets a strip that is done stop early.
 pub(super) const SEGMENT: usize = 4096;
 /// Blocks that a splat is entered into without a branch.
@@ -67,13 +62,14 @@ struct Bounds {
 }
 
 impl Segment {
-    /// Takes splats in drawing order; the strip begins at tile column `first_tile` and pixel row `top`.
+    /// Takes splats of a strip, in drawing order.
     #[inline(always)]
-    pub(super) fn load(&mut self, splats: impl Iterator<Item = Splat>, first_tile: usize, top: usize) {
+    pub(super) fn load(&mut self, splats: impl Iterator<Item = Splat>, strip: Strip) {
         // A loop that only copies keeps as many cache misses in flight as there can be.
         self.splats.clear();
         self.splats.extend(splats);
-        let (left, top) = ((first_tile * TILE) as f32, top as f32);
+        let first_tile = strip.first_tile();
+        let (left, top) = ((first_tile * TILE) as f32, strip.top() as f32);
         let block = |tile: u16| {
             let within = usize::from(tile).saturating_sub(first_tile).min(STRIP_TILES);
             (within * BLOCKS_PER_TILE) as f32
@@ -82,8 +78,8 @@ impl Segment {
         for group in self.splats.chunks(16) {
             let mut b = Bounds::default();
             for (lane, splat) in group.iter().enumerate() {
-                b.x[lane] = splat.paint.mean[0] - left;
-                b.y[lane] = splat.paint.mean[1] - top;
+                b.x[lane] = splat.screen.mean[0] - left;
+                b.y[lane] = splat.screen.mean[1] - top;
                 b.slope[lane] = splat.ellipse.slope;
                 b.bend[lane] = splat.ellipse.bend;
                 b.half_width_squared[lane] = splat.ellipse.half_width_squared;

@@ -1,13 +1,13 @@
 //! Second phase: one strip of the image, from the chunks' lists to finished pixels.
 
-use super::bin::{Bins, Entry, STRIP_TILES, STRIP_WIDTH, sort_by_depth, splat_of};
+use super::bin::{Bins, Entry, sort_by_depth, splat_of};
 use super::blend::{Block, Pixels};
+use super::grid::{BLOCK, BLOCKS, COLUMNS, STRIP_WIDTH, Strip, TILE};
 use super::lanes::{Kernel, Lanes};
-use super::pane::{Layer, Pane};
+use super::layer::{Layer, LayerBlock};
 use super::preprocess::Splat;
 use super::profile::{Clock, Phase};
-use super::project::TILE;
-use super::reach::{BLOCK, COLUMNS, SEGMENT, Segment};
+use super::reach::{SEGMENT, Segment};
 
 /// The part of the output that a strip writes: up to sixteen rows of it, each of the strip's width.
 #[derive(Default)]
@@ -33,10 +33,7 @@ pub(super) struct Scratch {
 
 /// Draws a strip.
 pub(super) struct DrawStrip<'a, 'b, Y> {
-    /// Strip number in the grid, and its column and row there.
-    pub(super) strip: usize,
-    pub(super) column: usize,
-    pub(super) row: usize,
+    pub(super) strip: Strip,
     pub(super) bins: &'a [Bins],
     pub(super) splats: &'a [Splat],
     pub(super) background: [f32; 3],
@@ -54,14 +51,14 @@ impl<Y: Layer> Kernel for DrawStrip<'_, '_, Y> {
         self.fill_background();
         self.scratch.clock.lap(Phase::Write);
         self.gather();
-        if self.scratch.entries.is_empty() && !Y::Pane::PRESENT {
+        if self.scratch.entries.is_empty() && !Y::Block::PRESENT {
             return;
         }
         sort_by_depth(&mut self.scratch.entries, &mut self.scratch.spare);
         self.scratch.clock.lap(Phase::Sort);
-        let mut panes = self.panes();
-        self.blend(l, &mut panes);
-        self.write(l, &mut panes);
+        let mut layers = self.layers();
+        self.blend(l, &mut layers);
+        self.write(l, &mut layers);
         self.scratch.clock.lap(Phase::Write);
     }
 }
@@ -70,40 +67,34 @@ impl<Y: Layer> DrawStrip<'_, '_, Y> {
     fn gather(&mut self) {
         self.scratch.entries.clear();
         for bins in self.bins {
-            self.scratch.entries.extend_from_slice(bins.strip(self.strip));
+            self.scratch.entries.extend_from_slice(bins.strip(self.strip.number));
         }
     }
 
     /// The layer by block.
     #[inline(always)]
-    fn panes(&self) -> Vec<Y::Pane> {
-        let pane = |block: usize| {
-            let (band, column) = (block / COLUMNS, block % COLUMNS);
-            self.layer.pane([self.column * STRIP_WIDTH + column * BLOCK, self.row * TILE + band * BLOCK])
-        };
-        (0..COLUMNS * TILE / BLOCK).map(pane).collect()
+    fn layers(&self) -> Vec<Y::Block> {
+        (0..BLOCKS).map(|block| self.layer.block(self.strip.corner(block))).collect()
     }
 
     #[inline(always)]
-    fn blend<L: Lanes>(&mut self, l: L, panes: &mut [Y::Pane]) {
+    fn blend<L: Lanes>(&mut self, l: L, layers: &mut [Y::Block]) {
         let Scratch { entries, segment, blocks, clock, .. } = &mut *self.scratch;
-        let left = self.column * STRIP_WIDTH;
-        let top = self.row * TILE;
         blocks.clear();
-        blocks.resize(COLUMNS * TILE / BLOCK, None);
+        blocks.resize(BLOCKS, None);
         for run in entries.chunks(SEGMENT) {
-            segment.load(run.iter().map(|&e| self.splats[splat_of(e)]), self.column * STRIP_TILES, top);
+            segment.load(run.iter().map(|&e| self.splats[splat_of(e)]), self.strip);
             clock.lap(Phase::Bin);
-            let bands = blocks.chunks_mut(COLUMNS).zip(panes.chunks_mut(COLUMNS));
-            for (band, (blocks, panes)) in bands.enumerate() {
+            let bands = blocks.chunks_mut(COLUMNS).zip(layers.chunks_mut(COLUMNS));
+            for (band, (blocks, layers)) in bands.enumerate() {
                 segment.list_band(l, band);
                 clock.lap(Phase::Bin);
-                for (column, (block, pane)) in blocks.iter_mut().zip(panes).enumerate() {
+                for (column, (block, layer)) in blocks.iter_mut().zip(layers).enumerate() {
                     let list = segment.list(column);
                     if !list.is_empty() {
-                        let corner = [left + column * BLOCK, top + band * BLOCK];
+                        let corner = self.strip.corner(band * COLUMNS + column);
                         let block = block.get_or_insert_with(Block::new);
-                        block.blend(l, corner, list, &segment.splats, pane);
+                        block.blend(l, corner, list, &segment.splats, layer);
                     }
                 }
                 clock.lap(Phase::Blend);
@@ -121,14 +112,14 @@ impl<Y: Layer> DrawStrip<'_, '_, Y> {
     }
 
     #[inline(always)]
-    fn write<L: Lanes>(&mut self, l: L, panes: &mut [Y::Pane]) {
-        let bands = self.scratch.blocks.chunks_mut(COLUMNS).zip(panes.chunks_mut(COLUMNS));
-        for (band, (blocks, panes)) in bands.enumerate() {
-            for (column, (block, pane)) in blocks.iter_mut().zip(panes).enumerate() {
+    fn write<L: Lanes>(&mut self, l: L, layers: &mut [Y::Block]) {
+        let bands = self.scratch.blocks.chunks_mut(COLUMNS).zip(layers.chunks_mut(COLUMNS));
+        for (band, (blocks, layers)) in bands.enumerate() {
+            for (column, (block, layer)) in blocks.iter_mut().zip(layers).enumerate() {
                 let (left, top) = (column * BLOCK, band * BLOCK);
-                if Y::Pane::PRESENT {
-                    block.get_or_insert_with(Block::new).finish(l, pane);
-                    write_shown(pane.shown(), &mut self.rows, left, top);
+                if Y::Block::PRESENT {
+                    block.get_or_insert_with(Block::new).finish(l, layer);
+                    write_shown(layer.shown(), &mut self.rows, left, top);
                 }
                 if let Some(block) = block {
                     block.pixels(l, self.background).write(&mut self.rows, left, top);

@@ -80,7 +80,7 @@ impl Section {
             Self::Poses => poses::run(quick)?,
             Self::Faces => faces::run(),
             Self::Scales => scales::run()?,
-            Self::Renderer => renderer::run(quick),
+            Self::Renderer => renderer::run(quick)?,
         };
         Ok(Examined { findings, pictures })
     }

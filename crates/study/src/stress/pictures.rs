@@ -5,7 +5,8 @@ use super::stage;
 use glam::DVec3;
 use skinsplat_core::scene::{Camera, Image, PosedBody, RestBody};
 use skinsplat_posing::{BoundAvatar, JointLift, PoseOptions, Poser, PosingError, RotationChoice};
-use skinsplat_render::splat::{RenderSettings, render};
+use skinsplat_render::View;
+use skinsplat_render::splat::render;
 
 /// Degrees of the joint in the four panels.
 const ANGLES: [f64; 4] = [150.0, 179.0, 181.0, 210.0];
@@ -70,7 +71,7 @@ fn strip(
         SIDE as u32,
         SIDE as u32,
     );
-    let settings = RenderSettings { background: [1.0; 3], antialiased: false };
+    let view = View::new(&camera).over([1.0; 3]);
     let strategy = stage::plain(rotation);
     let mut strip = Image::filled(SIDE * ANGLES.len(), SIDE, [1.0; 3]);
     let (mut poser, mut lift) = (Poser::new(), None::<JointLift>);
@@ -80,7 +81,7 @@ fn strip(
         let posed_body = PosedBody::new(body, &at)?;
         let next = JointLift::next(lift.as_ref(), &posed_body);
         let options = PoseOptions { lift: Some(&next), ..PoseOptions::default() };
-        let rendered = render(&poser.pose(bound, &posed_body, &strategy, &options)?, &camera, &settings);
+        let rendered = render(&poser.pose(bound, &posed_body, &strategy, &options)?, &view)?;
         lift = Some(next);
         let width = strip.width();
         for (y, row) in rendered.image.pixels().chunks(SIDE).enumerate() {

@@ -2,9 +2,9 @@
 
 use super::scenes::{FAMILIES, Family, Scene};
 use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, exactly, shown};
-use skinsplat_core::scene::Rendered;
-use skinsplat_render::definition;
-use skinsplat_render::splat::{RenderSettings, Renderer, SimdLevel, render};
+use skinsplat_core::scene::{Camera, Rendered, SceneError};
+use skinsplat_render::splat::{Renderer, SimdLevel, render};
+use skinsplat_render::{View, definition};
 
 const SECTION: &str = "renderer";
 
@@ -20,11 +20,15 @@ struct Measured {
     visible: f64,
 }
 
-fn measure(scene: &Scene, every_way: bool) -> Measured {
-    let settings = RenderSettings { background: [0.2, 0.4, 0.6], antialiased: false };
-    let own = render(&scene.posed.as_posed(), &scene.camera, &settings);
+/// How scenes are seen.
+fn view(camera: &Camera) -> View<'_> {
+    View::new(camera).over([0.2, 0.4, 0.6])
+}
+
+fn measure(scene: &Scene, every_way: bool) -> Result<Measured, SceneError> {
+    let own = render(&scene.posed.as_posed(), &view(&scene.camera))?;
     let (posed, camera) = scene.truth.as_ref().map_or((&scene.posed, &scene.camera), |(p, c)| (p, c));
-    let truth = definition::render(&posed.as_posed(), camera, &settings);
+    let truth = definition::render(&posed.as_posed(), &view(camera))?;
     // What is brighter than white is judged relative to how bright it is.
     let brightest = truth.iter().flat_map(|p| &p[..4]).fold(1.0f64, |m, v| m.max(v.abs()));
     let found = own.image.pixels().iter().zip(own.alpha.values());
@@ -38,12 +42,12 @@ fn measure(scene: &Scene, every_way: bool) -> Measured {
         .collect();
     errors.sort_unstable_by(f64::total_cmp);
     let kept = errors.len() - 1 - (AT_THE_EDGE * errors.len() as f64) as usize;
-    Measured {
+    Ok(Measured {
         finite: is_finite(&own),
-        deterministic: !every_way || same_every_way(scene, &settings, &own),
+        deterministic: !every_way || same_every_way(scene, &own),
         errors: [errors[errors.len() - 1], errors[kept]],
         visible: own.alpha.values().iter().fold(0.0, |m, &v| m.max(f64::from(v))),
-    }
+    })
 }
 
 fn is_finite(rendered: &Rendered) -> bool {
@@ -52,21 +56,21 @@ fn is_finite(rendered: &Rendered) -> bool {
 }
 
 /// Again, with one and with two threads, and with every vector width that this processor has.
-fn same_every_way(scene: &Scene, settings: &RenderSettings, own: &Rendered) -> bool {
+fn same_every_way(scene: &Scene, own: &Rendered) -> bool {
+    let (posed, view) = (scene.posed.as_posed(), view(&scene.camera));
     let pools = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build());
     let by_threads = pools
         .iter()
         .flatten()
-        .all(|pool| pool.install(|| render(&scene.posed.as_posed(), &scene.camera, settings)) == *own);
-    let by_width = [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512]
-        .into_iter()
+        .all(|pool| pool.install(|| render(&posed, &view)).is_ok_and(|drawn| drawn == *own));
+    let by_width = SimdLevel::available()
         .filter_map(Renderer::with_simd_level)
-        .all(|mut renderer| renderer.render(&scene.posed.as_posed(), &scene.camera, settings) == *own);
+        .all(|mut renderer| renderer.render(&posed, &view).is_ok_and(|drawn| drawn == own));
     by_threads && by_width
 }
 
 /// The section. `quick`: no more than 100,000 splats at one place.
-pub(super) fn run(quick: bool) -> Findings {
+pub(super) fn run(quick: bool) -> Result<Findings, SceneError> {
     let mut findings =
         Findings { section: SECTION, title: "The splat renderer on extreme scenes", ..Findings::default() };
     let mut grid = Grid {
@@ -80,7 +84,7 @@ pub(super) fn run(quick: bool) -> Findings {
         let mut cells = Vec::new();
         let (mut worst, mut sound) = (Verdict::Holds, None);
         for &x in &points {
-            let measured = measure(&(family.make)(x), true);
+            let measured = measure(&(family.make)(x), true)?;
             let row = row(family, x, &measured);
             worst = worst.max(row.verdict);
             cells.push(format!("{}: {}", exactly(x), row.error));
@@ -101,7 +105,7 @@ pub(super) fn run(quick: bool) -> Findings {
     }
     findings.grids.push(grid);
     findings.causes = causes();
-    findings
+    Ok(findings)
 }
 
 fn verdict(measured: &Measured) -> Verdict {
@@ -113,7 +117,10 @@ fn verdict(measured: &Measured) -> Verdict {
 }
 
 fn threshold(family: &Family, sound: f64, broken: f64) -> Threshold {
-    let breaks = |x: f64| verdict(&measure(&(family.make)(x), false)) == Verdict::Breaks;
+    // A scene that cannot be drawn breaks.
+    let breaks = |x: f64| {
+        measure(&(family.make)(x), false).map_or(Verdict::Breaks, |measured| verdict(&measured)) == Verdict::Breaks
+    };
     Threshold {
         section: SECTION,
         family: family.id.to_owned(),

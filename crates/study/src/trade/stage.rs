@@ -2,13 +2,16 @@
 
 use super::exact::{Rig, Shot};
 use super::{Error, motion, sweep};
-use skinsplat_core::scene::{Avatar, Binding, Camera, Pose, RestBody, SkinWeights};
+use skinsplat_core::scene::{
+    Avatar, Binding, Camera, Image, Pose, Posed, RestBody, SceneError, SkinWeights,
+};
 use skinsplat_data::select::evenly_spaced;
 use skinsplat_data::{Sequence, Subject};
 use skinsplat_fit::recipe::{BindTo, Placement};
 use skinsplat_fit::surface::{SurfaceInit, surface_init};
 use skinsplat_posing::BoundAvatar;
-use skinsplat_render::splat::RenderSettings;
+use skinsplat_render::View;
+use skinsplat_render::splat::render;
 use std::sync::Arc;
 
 /// How much is looked at.
@@ -82,7 +85,6 @@ pub struct Stage {
     pub(super) motions: [Motion; 2],
     /// Poses and cameras that the avatar was made from: what is pruned is judged by these.
     pub(super) training: Vec<(Pose, Camera)>,
-    pub(super) settings: RenderSettings,
 }
 
 /// Grey: neither a dark nor a bright splat at the outline is favoured.
@@ -164,7 +166,6 @@ impl Stage {
         .into_iter()
         .cloned()
         .collect();
-        let settings = RenderSettings { background: BACKGROUND, antialiased: false };
         Ok(Self {
             name: name.to_owned(),
             options: options.clone(),
@@ -173,8 +174,17 @@ impl Stage {
             bound,
             motions,
             training,
-            settings,
         })
+    }
+
+    /// How frames are drawn.
+    pub(super) fn view<'v>(&self, camera: &'v Camera) -> View<'v> {
+        View::new(camera).over(BACKGROUND)
+    }
+
+    /// A frame, drawn.
+    pub(super) fn image(&self, posed: &Posed, camera: &Camera) -> Result<Image, SceneError> {
+        Ok(render(posed, &self.view(camera))?.image)
     }
 
     /// What the numbers come from.

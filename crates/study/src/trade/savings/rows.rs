@@ -10,7 +10,8 @@ use skinsplat_core::math::rotation::angle_between;
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::{Avatar, Camera, Image, OwnedPosed, Pose, PosedBody, RestBody};
 use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, PosingError, Strategy, pose};
-use skinsplat_render::splat::{RenderSettings, Renderer};
+use skinsplat_render::View;
+use skinsplat_render::splat::Renderer;
 use std::hint::black_box;
 
 /// Largest difference of a colour value between the two ways of turning SH: rounding of `f32` only.
@@ -289,6 +290,6 @@ impl<'a> Way<'a> {
         let seen_by = self.knows_camera.then_some(camera);
         let options = PoseOptions { seen_by, ..PoseOptions::default() };
         let posed = self.poser.pose(self.bound, body, &self.strategy, &options)?;
-        Ok(self.renderer.render(&posed, camera, &RenderSettings::default()).image)
+        Ok(self.renderer.render(&posed, &View::new(camera))?.image.clone())
     }
 }

@@ -10,7 +10,8 @@ use skinsplat_metrics::lpips::weights;
 use skinsplat_metrics::lpips::{Network, NetworkSource, OneFrame};
 use skinsplat_metrics::{FrameScore, LpipsNet, MetricsError, Protocol, Wanted};
 use skinsplat_posing::pose;
-use skinsplat_render::splat::{RenderSettings, render};
+use skinsplat_render::View;
+use skinsplat_render::splat::render;
 use std::hint::black_box;
 
 /// A frame of the scene, drawn, and its truth.
@@ -25,8 +26,8 @@ impl Scored {
         let protocol = Protocol::parse("default")?;
         let background = protocol.background_colour().unwrap_or_default();
         let posed = pose(&bench.bound, &bench.bodies[0], &strategy("quaternion-average")?)?;
-        let settings = RenderSettings { background, antialiased: false };
-        let drawn = render(&posed.as_posed(), bench.cameras[0], &settings).image;
+        let view = View::new(bench.cameras[0]).over(background);
+        let drawn = render(&posed.as_posed(), &view)?.image;
         Ok(Self { protocol, drawn, truth: bench.scene.test.truth(bench.scene.frames[0])? })
     }
 

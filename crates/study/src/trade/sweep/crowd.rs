@@ -47,20 +47,18 @@ pub(super) fn avatars(bench: &Bench) -> Result<Sweep, Error> {
                 poses.iter().map(|at| PosedBody::new(&stage.rig.body, at)).collect::<Result<_, _>>()?;
             let (mut renderer, mut poser) = (Renderer::new(), Poser::new());
             let exact = posed(&mut poser, &stage.bound, &bodies, &stock())?;
-            let exact = renderer.render(&exact.as_posed(), camera, &stage.settings).image;
+            let view = stage.view(camera);
+            let exact = renderer.render(&exact.as_posed(), &view)?.image.clone();
             for (name, strategy, degree) in choices() {
                 let bound = if degree == 0 { &flat } else { &stage.bound };
                 let drawn = posed(&mut poser, bound, &bodies, &strategy)?;
-                let mut rendered = renderer.render(&drawn.as_posed(), camera, &stage.settings);
-                let fidelity = Some(Fidelity::between([(&rendered.image, &exact)])?);
+                let image = &renderer.render(&drawn.as_posed(), &view)?.image;
+                let fidelity = Some(Fidelity::between([(image, &exact)])?);
                 let repeats = stage.options.repeats;
                 let time = bench.pool.install(|| {
                     clock::time(repeats, || {
                         posed(&mut poser, bound, &bodies, &strategy)
-                            .map(|all| {
-                                renderer.render_into(&all.as_posed(), camera, &stage.settings, &mut rendered)
-                            })
-                            .is_ok()
+                            .is_ok_and(|all| renderer.render(&all.as_posed(), &view).is_ok())
                     })
                 });
                 let engine = name == "power-15, degree 0";

@@ -5,7 +5,7 @@ use crate::trade::exact::Shot;
 use crate::trade::{Error, Fidelity, Outcome, Sweep, SweepRow, Unit, clock};
 use skinsplat_core::scene::{Camera, Image, OwnedPosed};
 use skinsplat_render::definition::{self, Cutoffs};
-use skinsplat_render::splat::{RenderSettings, Renderer};
+use skinsplat_render::splat::Renderer;
 
 /// What the plain renderer does.
 #[derive(Clone, PartialEq)]
@@ -42,15 +42,15 @@ pub(super) fn cutoffs(bench: &Bench) -> Result<Sweep, Error> {
     let motion = &stage.motions[0];
     let posed: Vec<OwnedPosed> =
         motion.shots.iter().map(|shot| shot.exactly(&stage.rig, &stage.avatar.gaussians)).collect();
-    let one = |way: &Way, posed: &OwnedPosed, shot: &Shot| -> Image {
-        let settings = RenderSettings { antialiased: way.antialiased, ..stage.settings };
-        definition::draw(&posed.as_posed(), &shot.camera, &settings, way.cutoffs).image
+    let one = |way: &Way, posed: &OwnedPosed, shot: &Shot| -> Result<Image, Error> {
+        let view = stage.view(&shot.camera).antialiased(way.antialiased);
+        Ok(definition::draw(&posed.as_posed(), &view, way.cutoffs)?.image)
     };
-    let draw = |way: &Way| -> Vec<Image> {
+    let draw = |way: &Way| -> Result<Vec<Image>, Error> {
         posed.iter().zip(&motion.shots).map(|(posed, shot)| one(way, posed, shot)).collect()
     };
     let ways = ways();
-    let exact = draw(&ways[0]);
+    let exact = draw(&ways[0])?;
     let row = |name: String, outcome, note: &str| SweepRow {
         motion: motion.id,
         choice: vec![name],
@@ -59,7 +59,7 @@ pub(super) fn cutoffs(bench: &Bench) -> Result<Sweep, Error> {
     };
     let mut rows = Vec::new();
     for way in &ways {
-        let fidelity = Some(Fidelity::between(draw(way).iter().zip(&exact))?);
+        let fidelity = Some(Fidelity::between(draw(way)?.iter().zip(&exact))?);
         let repeats = stage.options.repeats.div_ceil(3);
         let work = || clock::time(repeats, || one(way, &posed[0], &motion.shots[0]));
         let time = Some(bench.pool.install(work));
@@ -105,32 +105,31 @@ pub(super) fn resolutions(bench: &Bench) -> Result<Sweep, Error> {
         .zip(&motion.shots)
         .map(|(posed, shot)| {
             let camera = scaled(&shot.camera, (samples, 1));
-            let drawn = definition::draw(&posed.as_posed(), &camera, &stage.settings, Cutoffs::NONE).image;
-            averaged(&drawn, samples as usize)
+            let drawn = definition::draw(&posed.as_posed(), &stage.view(&camera), Cutoffs::NONE)?.image;
+            Ok(averaged(&drawn, samples as usize))
         })
-        .collect();
+        .collect::<Result<_, Error>>()?;
     let mut rows = Vec::new();
     for share in SHARES {
         for antialiased in [false, true] {
-            let settings = RenderSettings { antialiased, ..stage.settings };
             let mut renderer = Renderer::new();
             let images: Vec<Image> = posed
                 .iter()
                 .zip(&motion.shots)
                 .map(|(posed, shot)| {
-                    let drawn =
-                        renderer.render(&posed.as_posed(), &scaled(&shot.camera, share), &settings).image;
-                    if share == (2, 1) {
-                        averaged(&drawn, 2)
+                    let camera = scaled(&shot.camera, share);
+                    let view = stage.view(&camera).antialiased(antialiased);
+                    let drawn = &renderer.render(&posed.as_posed(), &view)?.image;
+                    Ok(if share == (2, 1) {
+                        averaged(drawn, 2)
                     } else {
-                        enlarged(&drawn, shot.camera.width as usize, shot.camera.height as usize)
-                    }
+                        enlarged(drawn, shot.camera.width as usize, shot.camera.height as usize)
+                    })
                 })
-                .collect();
+                .collect::<Result<_, Error>>()?;
             let camera = scaled(&motion.shots[0].camera, share);
-            let mut rendered = renderer.render(&posed[0], &camera, &settings);
-            let time =
-                Some(bench.time(|| renderer.render_into(&posed[0], &camera, &settings, &mut rendered)));
+            let view = stage.view(&camera).antialiased(antialiased);
+            let time = Some(bench.time(|| renderer.render(&posed[0], &view).is_ok()));
             let fidelity = Some(Fidelity::between(images.iter().zip(&truth))?);
             let (over, under) = share;
             rows.push(SweepRow {

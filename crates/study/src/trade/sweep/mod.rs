@@ -75,16 +75,20 @@ impl<'a> Bench<'a> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
         let mut bench = Self { stage, pool, exact: [Vec::new(), Vec::new()] };
         for m in 0..2 {
-            bench.exact[m] = bench.drawn(m, |shot| shot.exactly(&stage.rig, &stage.avatar.gaussians));
+            bench.exact[m] = bench.drawn(m, |shot| shot.exactly(&stage.rig, &stage.avatar.gaussians))?;
         }
         Ok(bench)
     }
 
     /// Every shot of a motion, as `posed` poses it.
-    fn drawn(&self, motion: usize, mut posed: impl FnMut(&Shot) -> OwnedPosed) -> Vec<Image> {
-        let mut renderer = Renderer::new();
-        let draw =
-            |shot: &Shot| renderer.render(&posed(shot).as_posed(), &shot.camera, &self.stage.settings).image;
+    fn drawn(
+        &self,
+        motion: usize,
+        mut posed: impl FnMut(&Shot) -> OwnedPosed,
+    ) -> Result<Vec<Image>, Error> {
+        let draw = |shot: &Shot| -> Result<Image, Error> {
+            Ok(self.stage.image(&posed(shot).as_posed(), &shot.camera)?)
+        };
         self.stage.motions[motion].shots.iter().map(draw).collect()
     }
 
@@ -103,12 +107,11 @@ impl<'a> Bench<'a> {
     fn frame_time(&self, bound: &BoundAvatar, strategy: &Strategy, shot: &Shot) -> Result<Spread, Error> {
         let body = PosedBody::new(&self.stage.rig.body, &shot.pose)?;
         let (mut renderer, mut poser, options) = (Renderer::new(), Poser::new(), PoseOptions::default());
-        let posed = poser.pose(bound, &body, strategy, &options)?;
-        let mut rendered = renderer.render(&posed, &shot.camera, &self.stage.settings);
+        let view = self.stage.view(&shot.camera);
+        renderer.render(&poser.pose(bound, &body, strategy, &options)?, &view)?;
         Ok(self.time(|| {
-            if let Ok(posed) = poser.pose(bound, &body, strategy, &options) {
-                renderer.render_into(&posed, &shot.camera, &self.stage.settings, &mut rendered);
-            }
+            let posed = poser.pose(bound, &body, strategy, &options);
+            posed.is_ok_and(|posed| renderer.render(&posed, &view).is_ok())
         }))
     }
 }

@@ -85,7 +85,7 @@ fn posed(
             all.push(angles_of(bench, shot, rotations));
             all
         });
-        images.push(skinsplat_render::splat::render(&posed.as_posed(), &shot.camera, &stage.settings).image);
+        images.push(stage.image(&posed.as_posed(), &shot.camera)?);
     }
     let body = PosedBody::new(&stage.rig.body, &shots[0].pose)?;
     if strategy.rotation.needs_faces() {
@@ -180,22 +180,21 @@ fn coloured(bench: &Bench, m: usize, bound: &BoundAvatar, strategy: &Strategy) -
     for shot in shots {
         let body = PosedBody::new(&stage.rig.body, &shot.pose)?;
         let posed = pose(bound, &body, strategy)?;
-        images.push(skinsplat_render::splat::render(&posed.as_posed(), &shot.camera, &stage.settings).image);
+        images.push(stage.image(&posed.as_posed(), &shot.camera)?);
     }
     let shot = &shots[0];
     let body = PosedBody::new(&stage.rig.body, &shot.pose)?;
     let times = bench.pool.install(|| {
         let (mut renderer, mut poser, options) = (Renderer::new(), Poser::new(), PoseOptions::default());
-        let mut rendered = None;
+        renderer.profile(true);
+        let view = stage.view(&shot.camera);
         let mut times = Vec::new();
         for _ in 0..=stage.options.repeats {
             let start = Instant::now();
             let posed = poser.pose(bound, &body, strategy, &options)?;
             let posing = start.elapsed();
-            let target =
-                rendered.get_or_insert_with(|| renderer.render(&posed, &shot.camera, &stage.settings));
-            let phases = renderer.render_profiled(&posed, &shot.camera, &stage.settings, target);
-            times.push((posing + phases.of(Phase::Preprocess)).as_secs_f64().max(1e-9));
+            renderer.render(&posed, &view)?;
+            times.push((posing + renderer.phase_times().of(Phase::Preprocess)).as_secs_f64().max(1e-9));
         }
         Ok::<_, Error>(times)
     })?;

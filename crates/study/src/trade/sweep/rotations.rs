@@ -58,9 +58,9 @@ fn outcome(bench: &Bench, motion: usize, shots: &[Shot], solved: &Solved) -> Res
         .map(|shot| {
             let posed = shot.dressed(&stage.rig, &stage.avatar.gaussians, &solved.answers[next]);
             next += 1;
-            skinsplat_render::splat::render(&posed, &shot.camera, &stage.settings).image
+            stage.image(&posed, &shot.camera)
         })
-        .collect::<Vec<_>>();
+        .collect::<Result<Vec<_>, _>>()?;
     let angles = shots.iter().zip(&solved.answers).map(|(shot, answers)| shot.angles(answers));
     Ok(Outcome {
         time: Some(solved.time),

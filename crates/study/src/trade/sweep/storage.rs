@@ -114,9 +114,7 @@ pub(super) fn storage(bench: &Bench) -> Result<Sweep, Error> {
                 let body = PosedBody::new(&stage.rig.body, &shot.pose)?;
                 let posed = pose(&bound, &body, &stock())?;
                 angles.push(angles_of(bench, shot, posed.rotations.as_deref().unwrap_or_default()));
-                images.push(
-                    skinsplat_render::splat::render(&posed.as_posed(), &shot.camera, &stage.settings).image,
-                );
+                images.push(stage.image(&posed.as_posed(), &shot.camera)?);
             }
             let bytes = (full - 2.0 * numbers(parts)) / n;
             rows.push(SweepRow {
@@ -209,9 +207,7 @@ pub(super) fn splats(bench: &Bench) -> Result<Sweep, Error> {
             for shot in &motion.shots {
                 let body = PosedBody::new(&stage.rig.body, &shot.pose)?;
                 let posed = pose(&bound, &body, &stock())?;
-                images.push(
-                    skinsplat_render::splat::render(&posed.as_posed(), &shot.camera, &stage.settings).image,
-                );
+                images.push(stage.image(&posed.as_posed(), &shot.camera)?);
             }
             let time = bench.frame_time(&bound, &stock(), &motion.shots[0])?;
             let fidelity = Some(bench.fidelity(m, &images)?);
@@ -243,7 +239,7 @@ fn contributions(bench: &Bench) -> Result<Vec<f64>, Error> {
     for (at, camera) in &stage.training {
         let body = PosedBody::new(&stage.rig.body, at)?;
         let posed = pose(&stage.bound, &body, &stock())?;
-        let drawn = definition::draw(&posed.as_posed(), camera, &stage.settings, Cutoffs::STOCK);
+        let drawn = definition::draw(&posed.as_posed(), &stage.view(camera), Cutoffs::STOCK)?;
         sums.iter_mut().zip(&drawn.contributions).for_each(|(sum, share)| *sum += share);
     }
     Ok(sums)

@@ -5,30 +5,30 @@
 //! like a background: also where the splats in front left too little light for another splat. Where it leaves too little
 //! itself, the pixel is done. Drawing without an underlay is a compilation of its own, in which nothing of this is left.
 
-use super::blend::{LEAST_TRANSMITTANCE, Light};
+use super::accumulator::{Accumulator, LEAST_TRANSMITTANCE};
+use super::grid::pixels_of_block;
 use super::lanes::Lanes;
-use super::reach::BLOCK;
 use super::wide::{Wide, each};
 use skinsplat_core::scene::Underlay;
 
 /// What lies among the splats of an image.
 pub(super) trait Layer: Copy + Sync {
     /// Its part in one block.
-    type Pane: Pane;
+    type Block: LayerBlock;
 
     /// In the block whose first pixel is (`left`, `top`).
-    fn pane(self, corner: [usize; 2]) -> Self::Pane;
+    fn block(self, corner: [usize; 2]) -> Self::Block;
 }
 
 /// What lies among the splats of a 4x4-pixel block. Every pixel is crossed once on a way through its splats.
-pub(super) trait Pane: Copy {
+pub(super) trait LayerBlock: Copy {
     /// Whether there is anything.
     const PRESENT: bool;
 
     /// Blends the pixels that a splat at `depth` does not lie in front of.
-    fn cross<L: Lanes>(&mut self, l: L, depth: f32, light: &mut Light<L>);
+    fn cross<L: Lanes>(&mut self, l: L, depth: f32, sums: &mut Accumulator<L>);
 
-    /// [`Pane::cross`] of what is left of the light alone (0 where a pixel is done).
+    /// [`LayerBlock::cross`] of what is left of the light alone (0 where a pixel is done).
     fn dim<L: Lanes>(&mut self, l: L, depth: f32, open: &mut Wide<L>);
 
     /// On the way from back to front, before a splat at `depth` that lies in front of some pixels: the derivative along
@@ -41,22 +41,22 @@ pub(super) trait Pane: Copy {
 
 /// No layer.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Nothing;
+pub(super) struct NoLayer;
 
-impl Layer for Nothing {
-    type Pane = Self;
+impl Layer for NoLayer {
+    type Block = Self;
 
     #[inline(always)]
-    fn pane(self, _: [usize; 2]) -> Self {
+    fn block(self, _: [usize; 2]) -> Self {
         self
     }
 }
 
-impl Pane for Nothing {
+impl LayerBlock for NoLayer {
     const PRESENT: bool = false;
 
     #[inline(always)]
-    fn cross<L: Lanes>(&mut self, _: L, _: f32, _: &mut Light<L>) {}
+    fn cross<L: Lanes>(&mut self, _: L, _: f32, _: &mut Accumulator<L>) {}
 
     #[inline(always)]
     fn dim<L: Lanes>(&mut self, _: L, _: f32, _: &mut Wide<L>) {}
@@ -73,7 +73,7 @@ impl Pane for Nothing {
 /// Sixteen pixels of an underlay, row by row.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct UnderlayPane {
+pub(super) struct UnderlayBlock {
     colour: [[f32; 16]; 3],
     coverage: [f32; 16],
     /// NaN where nothing is covered, and where the pixel was crossed: no comparison finds it.
@@ -82,53 +82,49 @@ pub(super) struct UnderlayPane {
 }
 
 impl Layer for Underlay<'_> {
-    type Pane = UnderlayPane;
+    type Block = UnderlayBlock;
 
     #[inline(always)]
-    fn pane(self, [left, top]: [usize; 2]) -> UnderlayPane {
-        let (width, height) = (self.colour.width(), self.colour.height());
+    fn block(self, corner: [usize; 2]) -> UnderlayBlock {
         let nothing = [0.0; 16];
-        let (colour, depth) = ([nothing; 3], [f32::NAN; 16]);
-        let mut pane = UnderlayPane { colour, coverage: nothing, depth, shown: nothing };
-        for y in top..height.min(top + BLOCK) {
-            for x in left..width.min(left + BLOCK) {
-                let (pixel, lane) = (y * width + x, (y - top) * BLOCK + x - left);
-                let coverage = self.coverage.values()[pixel];
-                if coverage > 0.0 {
-                    pane.coverage[lane] = coverage;
-                    // The lesser of a NaN and a number is the number.
-                    pane.depth[lane] = self.depth.values()[pixel].min(f32::MAX);
-                    for (row, value) in pane.colour.iter_mut().zip(self.colour.pixels()[pixel]) {
-                        row[lane] = value;
-                    }
+        let mut block =
+            UnderlayBlock { colour: [nothing; 3], coverage: nothing, depth: [f32::NAN; 16], shown: nothing };
+        pixels_of_block(corner, [self.colour.width(), self.colour.height()], |pixel, lane| {
+            let coverage = self.coverage.values()[pixel];
+            if coverage > 0.0 {
+                block.coverage[lane] = coverage;
+                // The lesser of a NaN and a number is the number.
+                block.depth[lane] = self.depth.values()[pixel].min(f32::MAX);
+                for (row, value) in block.colour.iter_mut().zip(self.colour.pixels()[pixel]) {
+                    row[lane] = value;
                 }
             }
-        }
-        pane
+        });
+        block
     }
 }
 
-impl Pane for UnderlayPane {
+impl LayerBlock for UnderlayBlock {
     const PRESENT: bool = true;
 
     #[inline(always)]
-    fn cross<L: Lanes>(&mut self, l: L, depth: f32, light: &mut Light<L>) {
+    fn cross<L: Lanes>(&mut self, l: L, depth: f32, sums: &mut Accumulator<L>) {
         let own = Wide::load(l, &self.depth);
         let met = Wide::splat(l, depth).at_least(own);
         if !met.any() {
             return;
         }
         let coverage = Wide::load(l, &self.coverage);
-        let weight = met.keep(coverage * light.transmittance);
-        for (sum, colour) in light.colour.iter_mut().zip(&self.colour) {
+        let weight = met.keep(coverage * sums.transmittance);
+        for (sum, colour) in sums.colour.iter_mut().zip(&self.colour) {
             *sum = weight.mul_add(Wide::load(l, colour), *sum);
         }
         // The product of a weight of 0 with the NaN of an empty pixel would stay.
-        light.depth = met.select(weight.mul_add(own, light.depth), light.depth);
-        let left = coverage.neg_mul_add(light.transmittance, light.transmittance);
-        light.transmittance = met.select(left, light.transmittance);
+        sums.depth = met.select(weight.mul_add(own, sums.depth), sums.depth);
+        let left = coverage.neg_mul_add(sums.transmittance, sums.transmittance);
+        sums.transmittance = met.select(left, sums.transmittance);
         self.shown = met.select(weight, Wide::load(l, &self.shown)).store();
-        self.dim(l, depth, &mut light.open);
+        self.dim(l, depth, &mut sums.open);
     }
 
     #[inline(always)]
