@@ -41,7 +41,10 @@ impl Provenance {
         Self {
             program: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
             platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
-            simd: skinsplat_simd::level().unwrap_or_else(|_| skinsplat_simd::Level::detected()).name().to_owned(),
+            simd: skinsplat_simd::level()
+                .unwrap_or_else(|_| skinsplat_simd::Level::detected())
+                .name()
+                .to_owned(),
             threads: rayon::current_num_threads(),
             arguments: std::env::args().collect(),
             plan: plan.to_owned(),

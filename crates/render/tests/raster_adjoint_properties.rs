@@ -131,10 +131,8 @@ fn long_lists_have_the_derivatives_of_the_definition() {
     let some: Vec<usize> = drawn.into_iter().step_by(400).collect();
     assert!(some.len() > 10);
     let loss = |p: &OwnedPosed| scene.loss(p, &scene.camera, &chosen);
-    let expected: Vec<f64> = some
-        .iter()
-        .map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i]))
-        .collect();
+    let expected: Vec<f64> =
+        some.iter().map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i])).collect();
     let found: Vec<f32> = some.iter().map(|&i| gradient.opacities[i]).collect();
     assert_close("opacities", &found, &expected, 1e-5);
 }
@@ -210,7 +208,9 @@ fn nothing_carries_over_from_frame_to_frame() {
         let scene = Scene::new(seed, count, width, height);
         let (posed, view) = (&scene.posed, scene.view());
         renderer.render(&posed.as_posed(), &view).unwrap();
-        renderer.backward(&posed.as_posed(), &view, &scene.upstream, &mut gradient, Derivatives::Exact).unwrap();
+        renderer
+            .backward(&posed.as_posed(), &view, &scene.upstream, &mut gradient, Derivatives::Exact)
+            .unwrap();
         assert_eq!(gradient, scene.exact());
     }
 }

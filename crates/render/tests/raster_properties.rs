@@ -242,7 +242,10 @@ fn a_renderer_carries_nothing_over_from_frame_to_frame() {
     for (seed, most, width, height) in [(7, 700, 300, 90), (8, 3, 17, 16), (9, 2000, 64, 64), (10, 0, 1, 5)] {
         let (posed, camera, settings) = scene(seed, most, width, height);
         let view = settings.view(&camera);
-        assert_eq!(renderer.render(&posed.as_posed(), &view).unwrap(), &render(&posed.as_posed(), &view).unwrap());
+        assert_eq!(
+            renderer.render(&posed.as_posed(), &view).unwrap(),
+            &render(&posed.as_posed(), &view).unwrap()
+        );
     }
 }
 

@@ -112,7 +112,9 @@ impl Scene {
         let mut gradient = PosedGradient::default();
         let (posed, view) = (&self.posed, self.view());
         renderer.render(&posed.as_posed(), &view).unwrap();
-        renderer.backward(&posed.as_posed(), &view, &self.upstream, &mut gradient, Derivatives::Exact).unwrap();
+        renderer
+            .backward(&posed.as_posed(), &view, &self.upstream, &mut gradient, Derivatives::Exact)
+            .unwrap();
         gradient
     }
 
@@ -392,10 +394,8 @@ fn long_lists_have_the_image_and_the_derivatives_of_the_definition() {
     let some: Vec<usize> = drawn.into_iter().step_by(400).collect();
     assert!(some.len() > 10);
     let loss = |p: &OwnedPosed| scene.loss(p, &scene.layer, &selected);
-    let expected: Vec<f64> = some
-        .iter()
-        .map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i]))
-        .collect();
+    let expected: Vec<f64> =
+        some.iter().map(|&i| difference(&scene.posed, loss, 1e-4, |p| &mut p.opacities[i])).collect();
     let found: Vec<f32> = some.iter().map(|&i| gradient.opacities[i]).collect();
     assert_close("opacities", &found, &expected, 1e-4);
 }

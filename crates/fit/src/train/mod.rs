@@ -35,8 +35,8 @@ use skinsplat_core::scene::{
 use skinsplat_data::sequence::Sequence;
 use skinsplat_posing::nearest::NearestFace;
 use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
-use skinsplat_render::mesh::Drawing;
 use skinsplat_render::View;
+use skinsplat_render::mesh::Drawing;
 use skinsplat_render::splat::{Derivatives, Renderer};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -289,8 +289,7 @@ impl<'a> Trainer<'a> {
         let frame = self.frames.of_iteration(self.iteration as usize, &mut self.warnings)?;
         let body = PosedBody::new(&self.sequence.body, frame.pose).map_err(Error::scene(self.sequence))?;
         let (strategy, posing) = (&self.strategy, PoseOptions::default());
-        let Scratch { poser, renderer, truth, losses, of_rendered, of_posed, of_avatar } =
-            &mut self.scratch;
+        let Scratch { poser, renderer, truth, losses, of_rendered, of_posed, of_avatar } = &mut self.scratch;
         let posed = poser.pose(&self.bound, &body, strategy, &posing).map_err(&in_strategy)?;
         let background = background(recipe.background, self.options.seed, self.iteration);
         let in_scene = Error::scene(self.sequence);

@@ -178,7 +178,8 @@ mod tests {
         gaussians.sh_degree = 0;
         // Colour 1: the image is the alpha.
         gaussians.sh = vec![[(0.5 / sh::C0) as f32; 3]; gaussians.len()];
-        let drawn = draw(&OwnedPosed::from_static(&gaussians).as_posed(), &View::new(&camera), Cutoffs::NONE).unwrap();
+        let drawn = draw(&OwnedPosed::from_static(&gaussians).as_posed(), &View::new(&camera), Cutoffs::NONE)
+            .unwrap();
         let sum: f64 = drawn.image.pixels().iter().map(|p| f64::from(p[0])).sum();
         let shares: f64 = drawn.contributions.iter().sum();
         assert!((sum - shares).abs() < 1e-5 * sum, "{sum} {shares}");

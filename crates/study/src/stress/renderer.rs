@@ -119,7 +119,8 @@ fn verdict(measured: &Measured) -> Verdict {
 fn threshold(family: &Family, sound: f64, broken: f64) -> Threshold {
     // A scene that cannot be drawn breaks.
     let breaks = |x: f64| {
-        measure(&(family.make)(x), false).map_or(Verdict::Breaks, |measured| verdict(&measured)) == Verdict::Breaks
+        measure(&(family.make)(x), false).map_or(Verdict::Breaks, |measured| verdict(&measured))
+            == Verdict::Breaks
     };
     Threshold {
         section: SECTION,

@@ -2,9 +2,7 @@
 
 use super::exact::{Rig, Shot};
 use super::{Error, motion, sweep};
-use skinsplat_core::scene::{
-    Avatar, Binding, Camera, Image, Pose, Posed, RestBody, SceneError, SkinWeights,
-};
+use skinsplat_core::scene::{Avatar, Binding, Camera, Image, Pose, Posed, RestBody, SceneError, SkinWeights};
 use skinsplat_data::select::evenly_spaced;
 use skinsplat_data::{Sequence, Subject};
 use skinsplat_fit::recipe::{BindTo, Placement};
@@ -166,15 +164,7 @@ impl Stage {
         .into_iter()
         .cloned()
         .collect();
-        Ok(Self {
-            name: name.to_owned(),
-            options: options.clone(),
-            avatar,
-            rig,
-            bound,
-            motions,
-            training,
-        })
+        Ok(Self { name: name.to_owned(), options: options.clone(), avatar, rig, bound, motions, training })
     }
 
     /// How frames are drawn.

@@ -129,7 +129,7 @@ pub(super) fn resolutions(bench: &Bench) -> Result<Sweep, Error> {
                 .collect::<Result<_, Error>>()?;
             let camera = scaled(&motion.shots[0].camera, share);
             let view = stage.view(&camera).antialiased(antialiased);
-            let time = Some(bench.time(|| renderer.render(&posed[0], &view).is_ok()));
+            let time = Some(bench.time(|| renderer.render(&posed[0].as_posed(), &view).is_ok()));
             let fidelity = Some(Fidelity::between(images.iter().zip(&truth))?);
             let (over, under) = share;
             rows.push(SweepRow {

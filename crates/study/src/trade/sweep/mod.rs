@@ -81,11 +81,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Every shot of a motion, as `posed` poses it.
-    fn drawn(
-        &self,
-        motion: usize,
-        mut posed: impl FnMut(&Shot) -> OwnedPosed,
-    ) -> Result<Vec<Image>, Error> {
+    fn drawn(&self, motion: usize, mut posed: impl FnMut(&Shot) -> OwnedPosed) -> Result<Vec<Image>, Error> {
         let draw = |shot: &Shot| -> Result<Image, Error> {
             Ok(self.stage.image(&posed(shot).as_posed(), &shot.camera)?)
         };
