@@ -26,3 +26,4 @@ mod scoring;
 mod scoring_inputs;
 mod stressing;
 mod usage;
+mod widths;

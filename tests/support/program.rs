@@ -56,19 +56,16 @@ impl Desk {
         let mut command = Command::new(env!("CARGO_BIN_EXE_reproduce"));
         command.args(arguments).current_dir(self.folder.path()).stdin(Stdio::null());
         // Batch systems and terminals must not change what a test sees.
-        for name in ["SLURM_CPUS_PER_TASK", "COLUMNS", "RUST_BACKTRACE", "REPRODUCE_LPIPS_WEIGHTS"] {
+        for name in
+            ["SLURM_CPUS_PER_TASK", "COLUMNS", "RUST_BACKTRACE", "REPRODUCE_LPIPS_WEIGHTS"]
+        {
             command.env_remove(name);
         }
         command
     }
 
     pub fn run(&self, arguments: Vec<OsString>) -> Answer {
-        let output = self.command(arguments).output().unwrap();
-        Answer {
-            code: output.status.code(),
-            out: String::from_utf8(output.stdout).unwrap(),
-            err: String::from_utf8(output.stderr).unwrap(),
-        }
+        Answer::of(&mut self.command(arguments))
     }
 
     /// Runs what has to succeed; returns what it printed.
@@ -101,6 +98,16 @@ pub fn contents(folder: &Path) -> Vec<(PathBuf, Option<Vec<u8>>)> {
 }
 
 impl Answer {
+    /// Of a command that is started now.
+    pub fn of(command: &mut Command) -> Self {
+        let output = command.output().unwrap();
+        Self {
+            code: output.status.code(),
+            out: String::from_utf8(output.stdout).unwrap(),
+            err: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
     #[track_caller]
     pub fn exits(self, code: i32, what: &str) -> Self {
         assert_eq!(self.code, Some(code), "{what}\n{}\n{}", self.err, self.out);
