@@ -100,9 +100,8 @@ def check(path, recomputed, tolerances):
     return not found.failures
 
 
-def run(files, tolerances, argv=None):
+def run(files, tolerances, arguments):
     """`--check` (also without argument) compares, `--write` writes. Returns the exit status."""
-    arguments = sys.argv[1:] if argv is None else argv
     if arguments not in ([], ["--check"], ["--write"]):
         print("expected --check or --write", file=sys.stderr)
         return 2

@@ -10,11 +10,13 @@ UPPER = np.triu_indices(3)
 def rotation(q):
     """R(q) as the polynomial that the 3DGS kernels evaluate: a rotation only if |q| = 1."""
     w, x, y, z = q
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def unit(v):
@@ -57,7 +59,7 @@ def doubled_axis(m):
 
 
 def raw_quaternion(m):
-    """PyTorch3D's conversion by definition: row `branch` of 4 q qᵀ (for a rotation m), over twice its root diagonal."""
+    """PyTorch3D's conversion: of 4 q qᵀ (for a rotation m) the row with the largest diagonal, over twice its root."""
     sizes = doubled_sizes(m)
     rows = np.empty((4, 4))
     rows[0, 1:] = rows[1:, 0] = doubled_axis(m)

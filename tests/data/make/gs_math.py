@@ -4,9 +4,12 @@ Data: the Gaussians, cameras, bones and weights, and the pixels at which alpha i
 original 3DGS rasterizer: blur of 0.3 pixels, the Jacobian clamped at 1.3 times the field of view, tiles of 16 x 16.
 """
 
+import sys
+
 import numpy as np
 import roma
 import torch
+
 from common import run
 from formulas import (
     UPPER,
@@ -32,6 +35,9 @@ TOLERANCES = {
     "conic": 1e-12,
     "lambda2": 1e-11,
     "antialias_opacity_scale": 1e-11,
+    "posed_sh_eq9_16x3": 1e-13,
+    "rgb_skinned": 1e-13,
+    "variants": 1e-13,
     "image_hwc_tilecull": (0.0, 2e-14),
     "final_T_tilecull": (0.0, 2e-14),
     "max_abs_diff_without_tile_cull": 1e-12,
@@ -84,7 +90,9 @@ def colours(sh, direction):
         value = basis[:count] @ sh[:count] + 0.5
         clamped = np.maximum(value, 0)
         found[str(degree)] = {
-            "unclamped": value.tolist(), "rgb": clamped.tolist(), "clamped": (value < 0).tolist()
+            "unclamped": value.tolist(),
+            "rgb": clamped.tolist(),
+            "clamped": (value < 0).tolist(),
         }
     return found
 
@@ -98,7 +106,7 @@ def alphas(case, mean2d, conic):
     return found
 
 
-def three_sigma(case):
+def world_covariance(case):
     return covariance(rotation(unit(case["quat_wxyz"])) * case["scale"])
 
 
@@ -108,7 +116,8 @@ def recompute_gaussian(case):
     mean = np.array(case["mean"])
     cam = turn @ mean + shift
     position = -np.linalg.solve(turn, shift)
-    sigma = three_sigma(case)
+    sigma = world_covariance(case)
+    unnormalised = covariance(rotation(case["quat_wxyz"]) * case["scale"])
     flat, clamped = projected_covariance(case, cam, turn, sigma)
     cov = flat + BLUR * np.eye(2)
     conic, det, (first, second), radius = extent(cov)
@@ -120,7 +129,7 @@ def recompute_gaussian(case):
         "cam_pos": position.tolist(),
         "proj_row_major": projection(case["tan_fovx"], case["tan_fovy"]).ravel().tolist(),
         "cov3d_upper6": sigma[UPPER].tolist(),
-        "cov3d_kernel_unnormalised_q_upper6": covariance(rotation(case["quat_wxyz"]) * case["scale"])[UPPER].tolist(),
+        "cov3d_kernel_unnormalised_q_upper6": unnormalised[UPPER].tolist(),
         "mean_cam": cam.tolist(),
         "cov2d_no_blur": flat[np.triu_indices(2)].tolist(),
         "cov2d": cov[np.triu_indices(2)].tolist(),
@@ -149,7 +158,7 @@ def splats(scene):
         cam = view[:3, :3] @ mean + view[:3, 3]
         if cam[2] <= NEAR_CULL:
             continue
-        flat, _ = projected_covariance(scene, cam, view[:3, :3], three_sigma(case))
+        flat, _ = projected_covariance(scene, cam, view[:3, :3], world_covariance(case))
         conic, _, _, radius = extent(flat + BLUR * np.eye(2))
         position = screen_position(scene, cam, 0.0)
         eye = -np.linalg.solve(view[:3, :3], view[:3, 3])
@@ -261,4 +270,4 @@ FILES = {
 }
 
 if __name__ == "__main__":
-    raise SystemExit(run(FILES, TOLERANCES))
+    raise SystemExit(run(FILES, TOLERANCES, sys.argv[1:]))

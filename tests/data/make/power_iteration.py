@@ -3,7 +3,10 @@
 Data: quats_wxyz, weights, init_name, and the sign of exact_wxyz (an eigenvector has none of its own).
 """
 
+import sys
+
 import numpy as np
+
 from common import run
 from formulas import heaviest_side_sum, unit
 
@@ -62,4 +65,4 @@ def recompute(case):
 FILES = {"power_iteration/cases.json": lambda cases: [recompute(case) for case in cases]}
 
 if __name__ == "__main__":
-    raise SystemExit(run(FILES, TOLERANCES))
+    raise SystemExit(run(FILES, TOLERANCES, sys.argv[1:]))

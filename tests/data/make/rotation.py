@@ -1,15 +1,18 @@
 """fixtures/rotation: averages of rotations in 50 digits, and the projections of the blend in double precision.
 
 Data: name, kind, n, quats_wxyz, weights, note, err_rad_after. The exact problem: quaternions normalised in 50 digits,
-A = sum w q qᵀ, M = sum w R(q); its answers are rounded to double precision once. What other programs compute in double
-precision (Gram-Schmidt, PyTorch3D's quaternion, nlerp) starts from the rounded M. RoMa's Procrustes solution is compared
-with the 50-digit average on the way.
+A = sum w q qᵀ, M = sum w R(q); its answers are rounded to double precision once. What other programs compute in
+double precision (Gram-Schmidt, PyTorch3D's quaternion, nlerp) starts from the rounded M. RoMa's solution of the
+Procrustes problem is compared with the 50-digit average on the way.
 """
+
+import sys
 
 import mpmath as mp
 import numpy as np
 import roma
 import torch
+
 from common import run
 from formulas import doubled_axis, doubled_sizes, gram_schmidt, heaviest_side_sum, raw_quaternion, rotation
 
@@ -135,4 +138,4 @@ def recompute_all(cases):
 FILES = {"rotation/random.json": recompute_all, "rotation/extreme.json": recompute_all}
 
 if __name__ == "__main__":
-    raise SystemExit(run(FILES, TOLERANCES))
+    raise SystemExit(run(FILES, TOLERANCES, sys.argv[1:]))

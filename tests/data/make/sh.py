@@ -1,14 +1,17 @@
 """fixtures/sh: rotations of spherical harmonics from a solve in 50 digits, and the basis.
 
-Data: name, quat_wxyz, sh_16x3, dirs. D^l is defined by eval(D s, R d) = eval(s, d) for all s and d: with 2l + 1 directions,
-a linear system. The basis in 50 digits is mpmath's; e3nn's D^2 and D^3 are compared on the way.
+Data: name, quat_wxyz, sh_16x3, dirs. D^l is defined by eval(D s, R d) = eval(s, d) for all s and d: with 2l + 1
+directions, a linear system. The basis in 50 digits is mpmath's; e3nn's D^2 and D^3 are compared on the way.
 """
+
+import sys
 
 import mpmath as mp
 import numpy as np
 import torch
-from common import run
 from e3nn import o3
+
+from common import run
 from formulas import rotation, sh_basis
 
 mp.mp.dps = 50
@@ -20,7 +23,9 @@ P1 = [[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]
 # e3nn's constants have single precision.
 E3NN_TOLERANCE = 4e-6
 # Any directions for which the systems are well conditioned.
-DIRECTIONS = [mp.matrix(d) / mp.norm(mp.matrix(d)) for d in np.random.default_rng(1).normal(size=(7, 3)).tolist()]
+DIRECTIONS = [
+    mp.matrix(d) / mp.norm(mp.matrix(d)) for d in np.random.default_rng(1).normal(size=(7, 3)).tolist()
+]
 
 
 def band(degree, direction):
@@ -86,4 +91,4 @@ def recompute_basis(file):
 FILES = {"sh/sh_rotation.json": recompute_rotations, "sh/sh_basis.json": recompute_basis}
 
 if __name__ == "__main__":
-    raise SystemExit(run(FILES, TOLERANCES))
+    raise SystemExit(run(FILES, TOLERANCES, sys.argv[1:]))
