@@ -120,7 +120,11 @@ def network(net, dtype, spatial=False):
     model.net.load_state_dict(state)
     for k, layer in enumerate(model.lins):
         assert torch.equal(layer.model[-1].weight, tensors[f"lin.{k}.weight"]), f"{net}: lin.{k}"
-    return model.to(dtype)
+    model = model.to(dtype)
+    for constant in (model.scaling_layer.shift, model.scaling_layer.scale):
+        # They have three decimals, but went through single precision.
+        constant.copy_(constant.round(decimals=3))
+    return model
 
 
 def scaled(x, scale):
@@ -191,7 +195,7 @@ def tap_statistics(tap, committed):
     return {
         "shape": list(tap.shape),
         "mean": tap.mean().item(),
-        "std": tap.std().item(),
+        "std": tap.std(correction=0).item(),
         "max": tap.max().item(),
         "zero_fraction": (tap == 0).double().mean().item(),
         "l2": tap.norm().item(),
