@@ -68,6 +68,7 @@ class Comparison:
         relative, absolute = self.tolerance(path)
         limit = relative * max((abs(x) for x in old), default=0.0) + absolute
         off = max((abs(a - b) for a, b in zip(old, new)), default=0.0)
+        off = math.inf if any(map(math.isnan, new)) else off
         share = 0.0 if off == 0.0 else off / limit if limit else math.inf
         self.note(share <= 1.0, share, path, f"off by {off:.3g}, tolerance {limit:.3g}")
         self.count += len(new)

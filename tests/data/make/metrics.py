@@ -10,6 +10,7 @@ import functools
 import math
 import os
 import sys
+import warnings
 
 import lpips
 import numpy as np
@@ -114,7 +115,10 @@ def weights_files():
 @functools.cache
 def network(net, dtype, spatial=False):
     """lpips's own network with the weights of the file, whose channel weights are those of the lpips package."""
-    model = lpips.LPIPS(net=net, pnet_rand=True, spatial=spatial, verbose=False)
+    with warnings.catch_warnings():
+        # It names torchvision's argument for the weights as torchvision once did.
+        warnings.simplefilter("ignore", UserWarning)
+        model = lpips.LPIPS(net=net, pnet_rand=True, spatial=spatial, verbose=False)
     tensors = load_file(weights_files()[net])
     state = {name: tensors["features." + name.split(".", 1)[1]] for name in model.net.state_dict()}
     model.net.load_state_dict(state)
