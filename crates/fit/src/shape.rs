@@ -194,7 +194,8 @@ impl ShapeOptions {
             ("most_covered", self.most_covered, SHARE),
         ];
         within(section, &bounds)?;
-        self.moments.check(if section.is_empty() { "moments" } else { section })
+        let dot = if section.is_empty() { "" } else { "." };
+        self.moments.check(&format!("{section}{dot}moments"))
     }
 }
 
