@@ -44,8 +44,8 @@ impl Archive {
 
     /// Names of all arrays, sorted.
     pub fn names(&self) -> Vec<String> {
-        let arrays = self.inner.file_names().filter_map(|name| name.strip_suffix(SUFFIX));
-        let mut names: Vec<String> = arrays.map(str::to_owned).collect();
+        let array = |name: std::borrow::Cow<'_, str>| name.strip_suffix(SUFFIX).map(str::to_owned);
+        let mut names: Vec<String> = self.inner.file_names().flatten().filter_map(array).collect();
         names.sort();
         names
     }
