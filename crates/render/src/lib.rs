@@ -1,4 +1,5 @@
 //! From geometry and a camera to an image: [`splat`] draws Gaussians, [`mesh`] draws triangles. [`definition`] is the oracle.
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 pub mod definition;
 pub mod mesh;
