@@ -130,7 +130,7 @@ fn a_plan_counts_what_is_left_and_touches_nothing() {
 }
 
 /// Other kernels of the C library's `exp`, `sin` and the like, which round differently.
-const OTHER_KERNELS: (&str, &str) =
+pub(crate) const OTHER_KERNELS: (&str, &str) =
     ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-AVX,-AVX2_Usable,-FMA_Usable");
 
 #[test]

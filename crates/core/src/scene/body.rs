@@ -467,6 +467,19 @@ mod tests {
     }
 
     #[test]
+    fn vertices_out_of_reach_of_arithmetic_are_refused() {
+        for far in [1e160, f64::INFINITY, f64::NAN] {
+            let mut body = arm();
+            body.vertices[1].y = far;
+            let error = body.validate().unwrap_err();
+            assert_eq!(
+                (error.field.as_str(), error.expected.as_str()),
+                ("v_template[1]", "metres, at most 1e12 from the origin")
+            );
+        }
+    }
+
+    #[test]
     fn a_bent_elbow_moves_the_hand_only() {
         let body = arm();
         body.validate().unwrap();
