@@ -128,9 +128,9 @@ pub(super) fn resolutions(bench: &Bench) -> Result<Sweep, Error> {
                 })
                 .collect();
             let camera = scaled(&motion.shots[0].camera, share);
-            let mut rendered = renderer.render(&posed[0], &camera, &settings);
+            let mut rendered = renderer.render(&posed[0].as_posed(), &camera, &settings);
             let time =
-                Some(bench.time(|| renderer.render_into(&posed[0], &camera, &settings, &mut rendered)));
+                Some(bench.time(|| renderer.render_into(&posed[0].as_posed(), &camera, &settings, &mut rendered)));
             let fidelity = Some(Fidelity::between(images.iter().zip(&truth))?);
             let (over, under) = share;
             rows.push(SweepRow {

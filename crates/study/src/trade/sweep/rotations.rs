@@ -58,7 +58,7 @@ fn outcome(bench: &Bench, motion: usize, shots: &[Shot], solved: &Solved) -> Res
         .map(|shot| {
             let posed = shot.dressed(&stage.rig, &stage.avatar.gaussians, &solved.answers[next]);
             next += 1;
-            skinsplat_render::splat::render(&posed, &shot.camera, &stage.settings).image
+            skinsplat_render::splat::render(&posed.as_posed(), &shot.camera, &stage.settings).image
         })
         .collect::<Vec<_>>();
     let angles = shots.iter().zip(&solved.answers).map(|(shot, answers)| shot.angles(answers));
