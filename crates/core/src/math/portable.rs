@@ -137,7 +137,18 @@ mod tests {
         assert_eq!(bits, BITS);
     }
 
-    const BITS: [&str; 10] = [""; 10];
+    const BITS: [&str; 10] = [
+        "40009e04587c770e",
+        "bfd40dcad8849dae",
+        "bfc16b27c7c28b9b",
+        "3fe55d1908832d68",
+        "3fe7d300ae1af326",
+        "3fecb1ee2f1d05fe",
+        "3fea3bb068eee221",
+        "3fe808463f99780f",
+        "3fe43308d906d611",
+        "3fecd3894664262f",
+    ];
 
     #[test]
     fn functions_agree_with_those_of_the_system_to_the_last_place() {
