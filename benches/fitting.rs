@@ -1,5 +1,5 @@
 //! One step of a fit (pose, render, loss with SSIM, both ways, Adam) on the embedded subject at 512 x 512.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark")]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, missing_docs, reason = "a benchmark")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use skinsplat::datasets::Registry;

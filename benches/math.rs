@@ -1,5 +1,5 @@
 //! Cost per Gaussian of the kernels of layer 0. `cargo bench --bench math`.
-#![allow(missing_docs, reason = "benchmark")]
+#![allow(missing_docs, clippy::disallowed_methods, reason = "benchmark")]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use skinsplat_core::math::average::{Solver, Start, average_rotation, lanes, two_bones};

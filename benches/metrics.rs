@@ -2,6 +2,7 @@
 //! protocol, and LPIPS with AlexNet, of a pair and of a second render against a truth that was seen. `cargo bench --bench metrics`.
 #![allow(
     clippy::unwrap_used,
+    clippy::disallowed_methods,
     missing_docs,
     reason = "benchmark; criterion_group! makes undocumented functions"
 )]

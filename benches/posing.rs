@@ -3,7 +3,7 @@
 //! (`update`).
 //! `cargo bench --bench posing`; the time per element is the time per Gaussian. Forward kinematics and the skinned mesh
 //! are not counted.
-#![allow(missing_docs, clippy::unwrap_used, reason = "benchmark")]
+#![allow(missing_docs, clippy::unwrap_used, clippy::disallowed_methods, reason = "benchmark")]
 
 mod rig;
 

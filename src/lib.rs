@@ -21,6 +21,7 @@
 //! A module imports only from modules above it in this list (`tests/architecture.rs` reads the imports):
 //! [`math`] → [`scene`] → [`strategy`], [`render`], [`metrics`] → [`data`] → [`experiment`] → [`fit`], [`run`],
 //! [`report`], [`trade`] → [`cli`].
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 pub mod cli;
 pub mod datasets;

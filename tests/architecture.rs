@@ -1,5 +1,5 @@
 //! The layers of ARCHITECTURE.md, checked against the imports of every source file.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 use std::path::{Path, PathBuf};
 

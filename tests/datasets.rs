@@ -1,5 +1,5 @@
 //! Subjects, sequences and the registry.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "support/files.rs"]
 mod files;

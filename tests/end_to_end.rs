@@ -1,5 +1,5 @@
 //! Whole runs: repeated, threaded, killed, sharded, with a frame that fails; the files must not show any of it.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "support/program.rs"]
 mod program;

@@ -1,6 +1,6 @@
 //! Fitting end to end on the embedded subject, small: it helps on frames it has not seen, it is deterministic, it survives
 //! an interruption, and it says what is wrong.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 use skinsplat::datasets::Registry;
 use skinsplat::run::held_out::held_out;

@@ -1,6 +1,6 @@
 //! Mutated files: every reader returns a value or one error that names the file; it never panics and never allocates
 //! what the file cannot hold.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 #![allow(unsafe_code, reason = "an allocator that counts")]
 
 #[path = "support/files.rs"]

@@ -7,6 +7,7 @@ use super::output::emit;
 use crate::report::Results;
 use crate::run::store;
 use anyhow::{Context as _, Result, anyhow, bail};
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, Binding, Body, Image, Mask};
 use skinsplat_data::folder::{self, Options};
 use skinsplat_data::npz::Archive;
@@ -82,8 +83,10 @@ fn avatar_text(stored: &ply::Stored) -> String {
     let low = gaussians.means.iter().copied().reduce(glam::Vec3::min).unwrap_or_default();
     let high = gaussians.means.iter().copied().reduce(glam::Vec3::max).unwrap_or_default();
     text += &line("extent, metres", format!("{low:.3} to {high:.3}"));
-    text +=
-        &line("scale, metres", spread(gaussians.log_scales.iter().flat_map(|s| s.map(f32::exp).to_array())));
+    text += &line(
+        "scale, metres",
+        spread(gaussians.log_scales.iter().flat_map(|s| s.map(portable::exp).to_array())),
+    );
     text += &line("opacity", spread(gaussians.opacities()));
     if let Some(body) = &stored.body {
         text += &line("body", body);

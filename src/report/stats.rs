@@ -6,6 +6,7 @@
 //! are paired. The generator is SplitMix64 with a fixed seed, so the same frames give the same interval everywhere.
 
 use serde::{Deserialize, Serialize};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 
 /// Resamples behind an interval.
@@ -65,7 +66,7 @@ pub fn paired(sequences: &[Vec<f64>], higher_is_better: bool) -> Option<Paired> 
 
 /// Length of the blocks for a sequence of n frames.
 fn block_length(n: usize) -> usize {
-    ((n as f64).cbrt().round() as usize).max(2).min(n)
+    (portable::cbrt(n as f64).round() as usize).max(2).min(n)
 }
 
 /// The mean of as many values as there are, drawn in blocks that wrap around the end.

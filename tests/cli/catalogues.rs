@@ -128,3 +128,20 @@ fn a_plan_counts_what_is_left_and_touches_nothing() {
     assert_eq!((json["jobs"].as_array().unwrap().len(), json["avatars"].as_array().unwrap().len()), (2, 1));
     assert!(text.starts_with(&format!("plan {}\n", json["digest"].as_str().unwrap())), "{text}");
 }
+
+/// Other kernels of the C library's `exp`, `sin` and the like, which round differently.
+pub(crate) const OTHER_KERNELS: (&str, &str) =
+    ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-AVX,-AVX2_Usable,-FMA_Usable");
+
+#[test]
+fn a_plan_and_its_keys_do_not_depend_on_the_c_library() {
+    let desk = Desk::new();
+    let plan = |environment: Option<(&str, &str)>| {
+        let mut command = desk.command(args!["plan", "--profile", "quick", "--format", "json"]);
+        command.envs(environment);
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        output.stdout
+    };
+    assert!(plan(None) == plan(Some(OTHER_KERNELS)), "the keys differ");
+}

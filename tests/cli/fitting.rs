@@ -1,6 +1,7 @@
 //! `reproduce fit`: what it writes, what it refuses.
 
 use crate::args;
+use crate::catalogues::OTHER_KERNELS;
 use crate::program::Desk;
 use serde_json::Value;
 
@@ -39,8 +40,13 @@ fn a_fit_leaves_an_avatar_that_poses_and_says_how_it_was_made() {
     assert!(held.iter().all(|name| !name.ends_with("checkpoint")), "{held:?}");
     assert!(desk.ok(args!["inspect", "ava.ply"]).contains("joint"));
     let first = desk.bytes("ava.ply");
-    desk.ok([args!["--threads", "1"], fit].concat());
+    desk.ok([args!["--threads", "1"], fit.clone()].concat());
     assert_eq!(first, desk.bytes("ava.ply"), "the same bits on one thread");
+    let status = desk.command(fit).envs([OTHER_KERNELS]).output().unwrap().status;
+    assert!(
+        status.success() && first == desk.bytes("ava.ply"),
+        "the same bits with other kernels of the C library"
+    );
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! The program from outside: every subcommand, every exit code, every kind of bad input.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../support/files.rs"]
 mod files;

@@ -176,3 +176,91 @@ pub(super) fn of_truths(truths: &[Truth]) -> SourceDigest {
     }
     hash.finish()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FrameGenerator, FrameRef, Sourced};
+    use glam::DMat4;
+    use skinsplat_core::scene::{Image, Mask, Skeleton, SkinWeights};
+    use std::sync::Arc;
+
+    #[derive(Debug)]
+    struct Grey(f32);
+
+    impl FrameGenerator for Grey {
+        fn truth(&self, _: usize) -> Truth {
+            Truth { rgb: Image::filled(8, 4, [self.0; 3]), alpha: Mask::filled(8, 4, 1.0) }
+        }
+
+        fn key(&self) -> String {
+            "grey".to_owned()
+        }
+    }
+
+    fn sequence(grey: f32) -> Sequence {
+        let camera = Camera {
+            width: 8,
+            height: 4,
+            fx: 9.0,
+            fy: 9.0,
+            cx: 4.0,
+            cy: 2.0,
+            camera_from_world: DMat4::IDENTITY,
+        };
+        let skeleton = Skeleton::from_joint_positions(vec!["root".into()], vec![None], &[DVec3::ZERO]);
+        let body = RestBody {
+            skeleton: skeleton.unwrap(),
+            vertices: vec![DVec3::X],
+            faces: Vec::new(),
+            weights: SkinWeights::from_rows([[(0, 1.0)]], 1).unwrap(),
+            uv: None,
+            pose_directions: Vec::new(),
+        };
+        let source = FrameSource::Generated { generator: Arc::new(Grey(grey)), frame: 0 };
+        Sequence {
+            id: "test".into(),
+            poses: vec![Pose::rest(&body.skeleton)].into(),
+            body: Arc::new(body),
+            cameras: vec![camera].into(),
+            frames: vec![FrameRef { name: "image".into(), pose: 0, camera: 0, source }],
+            stored_sizes: None,
+        }
+    }
+
+    fn digest(sequence: &Sequence) -> String {
+        sequence.digest().unwrap()
+    }
+
+    #[test]
+    fn frames_in_memory_are_told_apart_by_their_pixels() {
+        let held = |grey| sequence(grey).held().unwrap();
+        assert_eq!(digest(&held(0.5)), digest(&held(0.5)));
+        assert_ne!(digest(&held(0.5)), digest(&held(0.501)));
+        assert_eq!(digest(&sequence(0.5)), digest(&sequence(0.501)), "a generator answers for its key");
+    }
+
+    #[test]
+    fn computed_parts_count_as_what_they_were_computed_from() {
+        let (plain, source) = (sequence(0.5), SourceDigest::of_bytes(b"angles"));
+        let turned = |by: f64| {
+            let mut poses = plain.poses.to_vec();
+            poses[0].locals[0].rotation.x += by;
+            poses
+        };
+        let with = |poses| digest(&Sequence { poses, ..plain.clone() });
+        let computed = |by| with(Sourced::computed(turned(by), source));
+        assert_eq!(computed(0.0), computed(1e-17 + 1e-9), "a sine was rounded otherwise");
+        assert_ne!(computed(0.0), with(Sourced::computed(turned(0.0), SourceDigest::of_bytes(b"others"))));
+        assert_ne!(with(turned(0.0).into()), with(turned(1e-9).into()), "numbers of their own count");
+    }
+
+    #[test]
+    fn smaller_cameras_of_one_source_are_other_cameras() {
+        let mut generated = sequence(0.5);
+        generated.cameras = Sourced::computed(generated.cameras.to_vec(), SourceDigest::of_bytes(b"ring"));
+        let sides = [8, 4, 2].map(|side| digest(&generated.reduced(side)));
+        assert_eq!(sides[0], digest(&generated), "nothing was reduced");
+        assert!(sides[0] != sides[1] && sides[1] != sides[2]);
+    }
+}

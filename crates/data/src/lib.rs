@@ -18,6 +18,7 @@
 //! | [`folder`] | a subject as a folder of sequences |
 //! | [`peoplesnapshot`] | PeopleSnapshot as prepared for InstantAvatar |
 //! | [`sequence`] | posed frames with their cameras, decoded when asked for |
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 pub mod atomic;
 pub mod body;

@@ -3,6 +3,7 @@
 use crate::options::Moments;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use skinsplat_core::math::portable;
 
 /// Values per unit of parallel work.
 const CHUNK: usize = 1 << 14;
@@ -44,7 +45,8 @@ impl Adam {
         assert_eq!(parameters.len(), self.first.len(), "one moment per parameter");
         assert_eq!(gradient.len(), self.first.len(), "one derivative per parameter");
         self.steps += 1;
-        let power = |beta: f32| f64::from(beta).powi(i32::try_from(self.steps).unwrap_or(i32::MAX));
+        let power =
+            |beta: f32| portable::powi(f64::from(beta), i32::try_from(self.steps).unwrap_or(i32::MAX));
         let Moments { beta1, beta2, epsilon } = self.options;
         let correction = (1.0 - power(beta2)).sqrt();
         let scale = (correction / (1.0 - power(beta1))) as f32;

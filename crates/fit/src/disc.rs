@@ -3,6 +3,7 @@
 
 use super::options::Cover;
 use glam::{DMat3, DQuat, DVec3, Vec3};
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::body::vertex_normals;
 
 /// A flat Gaussian on a surface, in the rest pose.
@@ -23,15 +24,16 @@ impl Disc {
         let moment = |a: DVec3, b: DVec3| a.dot(self.moment * b);
         let (uu, uv, vv) = (moment(u, u), moment(u, v), moment(v, v));
         let (mean, difference) = ((uu + vv) / 2.0, (uu - vv) / 2.0);
-        let spread = difference.hypot(uv);
-        let angle = uv.atan2(difference) / 2.0;
-        let major = u * angle.cos() + v * angle.sin();
+        let spread = portable::hypot(difference, uv);
+        let angle = portable::atan2(uv, difference) / 2.0;
+        let (sine, cosine) = portable::sin_cos(angle);
+        let major = u * cosine + v * sine;
         let sigma = |variance: f64| (scale * variance.max(0.0).sqrt()).max(cover.least_sigma);
         let long = sigma(mean + spread);
         let short = sigma(mean - spread).max(long / cover.largest_aspect);
         let thin = (thickness * (long * short).sqrt()).max(cover.least_sigma);
         let q = DQuat::from_mat3(&DMat3::from_cols(major, normal.cross(major), normal)).normalize();
-        ([q.w, q.x, q.y, q.z].map(|c| c as f32), DVec3::new(long, short, thin).map(f64::ln).as_vec3())
+        ([q.w, q.x, q.y, q.z].map(|c| c as f32), DVec3::new(long, short, thin).map(portable::ln).as_vec3())
     }
 }
 

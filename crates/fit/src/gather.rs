@@ -196,10 +196,12 @@ fn robust_weight(
 ) -> f32 {
     let distance = |c: usize| -> f64 {
         let model: f64 = coefficients.iter().zip(basis).map(|(k, b)| f64::from(k[c]) * b).sum();
-        (f64::from(seen.colour[c]) - origin - model).powi(2)
+        let off = f64::from(seen.colour[c]) - origin - model;
+        off * off
     };
     let squared = (0..3).map(distance).sum::<f64>() / 3.0;
-    (1.0 / (1.0 + squared / (scale * scale)).powi(2)) as f32
+    let distance = 1.0 + squared / (scale * scale);
+    (1.0 / (distance * distance)) as f32
 }
 
 /// Normal equations of one part: `Σ w φ φᵀ x = Σ w φ (colour - origin)`.

@@ -19,6 +19,7 @@ use diffusion::Diffusion;
 use rayon::prelude::*;
 use regularity::{Regularity, Weights};
 use serde::{Deserialize, Serialize};
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::RestBody;
 use skinsplat_data::sequence::Sequence;
 use std::ops::ControlFlow;
@@ -194,14 +195,15 @@ impl ShapeOptions {
             ("most_covered", self.most_covered, SHARE),
         ];
         within(section, &bounds)?;
-        self.moments.check(if section.is_empty() { "moments" } else { section })
+        let dot = if section.is_empty() { "" } else { "." };
+        self.moments.check(&format!("{section}{dot}moments"))
     }
 }
 
 impl ShapeFit {
     fn rate(&self, iteration: usize) -> f32 {
         let done = iteration as f64 / self.iterations as f64;
-        (self.options.learning_rate * 0.5 * (1.0 + (std::f64::consts::PI * done).cos())) as f32
+        (self.options.learning_rate * 0.5 * (1.0 + portable::cos(std::f64::consts::PI * done))) as f32
     }
 }
 

@@ -3,6 +3,7 @@
 use super::Error;
 use super::options::Sighting;
 use glam::{DVec2, DVec3, Vec3};
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Camera, Image, Mask, PosedBody};
 use skinsplat_data::sequence::{Sequence, Truth};
 use skinsplat_render::mesh::{Mesh, VisibleFaces, visible_faces};
@@ -72,7 +73,7 @@ impl<'a> Frame<'a> {
             return unseen;
         }
         let covered = if coverage < options.full_coverage { options.beside_outline } else { 1.0 };
-        let weight = facing.powi(options.facing_power) * trust * covered;
+        let weight = portable::powi(facing, options.facing_power) * trust * covered;
         Observation { colour, weight: weight as f32, position }
     }
 

@@ -11,6 +11,7 @@ use super::tessellation::Tessellation;
 use super::{Error, clothing, tessellation, training};
 pub use crate::recipe::{BindTo, Placement};
 use glam::DVec3;
+use skinsplat_core::math::portable;
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::body::vertex_normals;
 use skinsplat_core::scene::{
@@ -264,7 +265,7 @@ impl Layout {
             .zip(self.insets(init, colours))
             .map(|(d, inset)| d.centre - d.normal * inset)
             .collect();
-        let logit = (init.opacity / (1.0 - init.opacity)).ln() as f32;
+        let logit = portable::ln(init.opacity / (1.0 - init.opacity)) as f32;
         let binding = match (init.bind_to, self.parts.skin.clone()) {
             (BindTo::Joints, Some(skin)) => Binding::Vertex(skin),
             _ => Binding::Face(FaceBinding {

@@ -1,5 +1,5 @@
 //! Avatars made directly from training frames: a sphere of known colours, seen from a ring of cameras.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 use glam::{DVec3, Vec3};
 use skinsplat_core::scene::{Avatar, Camera, Image, Pose, PosedBody, RestBody, Skeleton, SkinWeights, Uv};
@@ -274,6 +274,14 @@ fn impossible_requests_name_what_is_wrong() {
     assert_eq!(field(surface_init(&train, &SurfaceInit { longest_edge: 0.0, ..coarse() })), "longest_edge");
     let empty = Sequence { frames: Vec::new(), ..train.clone() };
     assert_eq!(field(surface_init(&empty, &coarse())), "sequence train: frames");
+    let mut giant = (*train.body).clone();
+    giant.vertices.iter_mut().for_each(|v| *v *= 100.0);
+    let giant = Sequence { body: Arc::new(giant), ..train.clone() };
+    assert_eq!(
+        surface_init(&giant, &coarse()).unwrap_err().to_string(),
+        "sequence train: body: its surface is 60.0 m across; expected at most 10 m: vertices in metres (are these \
+         centimetres?)"
+    );
     let mut body = (*train.body).clone();
     body.uv = None;
     let bare = Sequence { body: Arc::new(body), ..train };

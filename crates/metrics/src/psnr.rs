@@ -3,6 +3,7 @@
 use super::{MetricsError, Planes};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use skinsplat_core::math::portable;
 
 /// How one PSNR comes from the mean squared errors of three channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -21,11 +22,11 @@ pub enum PsnrVariant {
 impl PsnrVariant {
     /// The PSNR, dB, of channel-wise mean squared errors. Infinite for identical images, except with `RmseEpsilon`.
     pub fn psnr(self, channel_mse: [f64; 3]) -> f64 {
-        let decibel = |mse: f64| -10.0 * mse.log10();
+        let decibel = |mse: f64| -10.0 * portable::log10(mse);
         match self {
             Self::Image => decibel(mean(channel_mse)),
             Self::MeanOfChannels => mean(channel_mse.map(decibel)),
-            Self::RmseEpsilon => -20.0 * (mean(channel_mse).sqrt() + 1e-8).log10(),
+            Self::RmseEpsilon => -20.0 * portable::log10(mean(channel_mse).sqrt() + 1e-8),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Posed Gaussians as plain static ones: what any rasterizer draws without knowing about bodies.
 
 use glam::{DMat3, Mat3, Vec3};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::{Matrix3, rotation, sh};
 use skinsplat_core::scene::{ColourClamp, Gaussians, Posed};
 
@@ -60,7 +61,7 @@ pub fn bake(posed: &Posed<'_>, canonical: &Gaussians) -> Baked {
 /// Logarithms of the column norms of M = R diag(s): the canonical ones, bit for bit, unless the strategy changed sizes.
 fn log_norms(factor: Mat3, canonical: Vec3) -> Vec3 {
     let measured = Vec3::from_array(
-        [factor.x_axis, factor.y_axis, factor.z_axis].map(|c| c.as_dvec3().length().ln() as f32),
+        [factor.x_axis, factor.y_axis, factor.z_axis].map(|c| portable::ln(c.as_dvec3().length()) as f32),
     );
     let unchanged = (measured - canonical).abs().max_element() <= 1e-4;
     if unchanged || !measured.is_finite() { canonical } else { measured }
@@ -81,8 +82,8 @@ fn principal_axes(factor: Mat3) -> ([f32; 4], Vec3) {
             }
             rotated = true;
             let zeta = (beta - alpha) / (2.0 * gamma);
-            let t = 1f64.copysign(zeta) / (zeta.abs() + zeta.hypot(1.0));
-            let (c, s) = (t.hypot(1.0).recip(), t / t.hypot(1.0));
+            let t = 1f64.copysign(zeta) / (zeta.abs() + portable::hypot(zeta, 1.0));
+            let (c, s) = (portable::hypot(t, 1.0).recip(), t / portable::hypot(t, 1.0));
             (*rows.col_mut(p), *rows.col_mut(q)) = (a * c - b * s, a * s + b * c);
             let (a, b) = (axes.col(p), axes.col(q));
             (*axes.col_mut(p), *axes.col_mut(q)) = (a * c - b * s, a * s + b * c);
@@ -91,7 +92,8 @@ fn principal_axes(factor: Mat3) -> ([f32; 4], Vec3) {
             break;
         }
     }
-    let lengths = [0, 1, 2].map(|k| rows.col(k).length().max(f64::from(f32::MIN_POSITIVE)).ln() as f32);
+    let lengths =
+        [0, 1, 2].map(|k| portable::ln(rows.col(k).length().max(f64::from(f32::MIN_POSITIVE))) as f32);
     let row_major: Matrix3<f64> = axes.transpose().to_cols_array_2d();
     (rotation::matrix_to_quaternion(row_major).map(|c| c as f32), Vec3::from_array(lengths))
 }

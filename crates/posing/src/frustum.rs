@@ -38,7 +38,8 @@ impl Frustum {
             let size = f64::from(size);
             // The slope is clamped to this or, around a principal point outside the image, to more.
             let limit = JACOBIAN_LIMIT * (size + centre.abs()) / focal;
-            (focal * (norm(k) + limit * norm(2))).powi(2)
+            let most = focal * (norm(k) + limit * norm(2));
+            most * most
         };
         let stretch =
             row(0, camera.fx, camera.cx, camera.width) + row(1, camera.fy, camera.cy, camera.height);

@@ -7,6 +7,7 @@
 
 use super::lanes::{LANES, Lanes};
 use rayon::prelude::*;
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Gaussians, SkinWeights};
 
 /// Gaussians per chunk.
@@ -113,7 +114,7 @@ impl Chunk {
                 let log_scale = gaussians.log_scales[start + i];
                 for axis in 0..3 {
                     block.means[axis][lane] = means[i][axis];
-                    block.scales[axis][lane] = log_scale[axis].exp();
+                    block.scales[axis][lane] = portable::exp(log_scale[axis]);
                 }
             }
         }

@@ -1,5 +1,10 @@
 //! The splatting rasterizer against images that the original 3DGS kernels computed, and against reference values in f64.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; the agreement is printed")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    clippy::print_stdout,
+    reason = "tests; the agreement is printed"
+)]
 
 #[path = "../../../tests/support/splat_scene.rs"]
 mod splat_scene;

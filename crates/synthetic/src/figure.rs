@@ -6,6 +6,7 @@ use super::skeleton::{Joints, Placement, Proportions, figure_joints};
 use super::{atlas, flesh, surface, weights};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::body::vertex_normals;
 use skinsplat_core::scene::{RestBody, SceneError, Skeleton};
 use skinsplat_data::Capture;
@@ -109,9 +110,10 @@ fn assemble(
 fn openness(field: &Field, vertex: DVec3, normal: DVec3, step: f64) -> f32 {
     let missing = |k: u32| {
         let distance = step * f64::from(k);
-        (1.0 - field.distance(vertex + normal * distance) / distance).clamp(0.0, 1.0) * 0.6f64.powi(k as i32)
+        (1.0 - field.distance(vertex + normal * distance) / distance).clamp(0.0, 1.0)
+            * portable::powi(0.6, k as i32)
     };
-    let worst: f64 = (1..=5).map(|k| 0.6f64.powi(k)).sum();
+    let worst: f64 = (1..=5).map(|k| portable::powi(0.6, k)).sum();
     let hidden: f64 = (1..=5).map(missing).sum();
     (1.0 - 1.3 * hidden / worst).clamp(0.15, 1.0) as f32
 }

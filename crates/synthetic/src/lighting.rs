@@ -4,6 +4,7 @@
 //! ambient occlusion that belongs to the surface.
 
 use glam::Vec3;
+use skinsplat_core::math::portable;
 
 /// What the surface is made of at a point. Colours are linear, not sRGB.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +70,7 @@ pub(super) fn shade(finish: Finish, normal: Vec3, view: Vec3, openness: f32) -> 
 /// Schlick's approximation of Fresnel's equations; a reflectance below 2 % takes the grazing reflection away as well.
 fn schlick(reflectance: f32, cosine: f32) -> f32 {
     let grazing = (reflectance * 50.0).min(1.0);
-    reflectance + (grazing - reflectance) * (1.0 - cosine).clamp(0.0, 1.0).powi(5)
+    reflectance + (grazing - reflectance) * portable::powi((1.0 - cosine).clamp(0.0, 1.0), 5)
 }
 
 /// π D F V: GGX distribution, Schlick's Fresnel term, and the separable fit 1 / (2 lerp(2 n·l n·v, n·l + n·v, α)) to
@@ -89,15 +90,20 @@ pub(super) fn to_srgb(radiance: Vec3) -> [f32; 3] {
     radiance.to_array().map(|c| {
         // The identity up to the knee, then an exponential approach to 1 with the same slope.
         const KNEE: f32 = 0.7;
-        let rolled =
-            if c <= KNEE { c.max(0.0) } else { 1.0 - (1.0 - KNEE) * (-(c - KNEE) / (1.0 - KNEE)).exp() };
-        if rolled <= 0.003_130_8 { 12.92 * rolled } else { 1.055 * rolled.powf(1.0 / 2.4) - 0.055 }
+        let rolled = if c <= KNEE {
+            c.max(0.0)
+        } else {
+            1.0 - (1.0 - KNEE) * portable::exp(-(c - KNEE) / (1.0 - KNEE))
+        };
+        if rolled <= 0.003_130_8 { 12.92 * rolled } else { 1.055 * portable::pow(rolled, 1.0 / 2.4) - 0.055 }
     })
 }
 
 /// sRGB value to linear.
 pub(super) fn to_linear(srgb: [f32; 3]) -> Vec3 {
-    Vec3::from_array(srgb.map(|c| if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }))
+    Vec3::from_array(
+        srgb.map(|c| if c <= 0.040_45 { c / 12.92 } else { portable::pow((c + 0.055) / 1.055, 2.4) }),
+    )
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use super::noise;
 use super::parameters::{Look, Pattern};
 use super::skeleton::{ARM_Y, ARM_Z};
 use glam::{Vec2, Vec3};
+use skinsplat_core::math::portable;
 use std::f32::consts::TAU;
 
 /// Colours and patterns of a subject.
@@ -161,7 +162,7 @@ impl Material {
     /// Rings with a cross on the chest.
     fn emblem(&self, at: Vec2, cloth: Vec3) -> Vec3 {
         let radius = at.length();
-        let spokes = (at.y.atan2(at.x) * 6.0 / TAU).rem_euclid(1.0) < 0.5;
+        let spokes = (portable::atan2(at.y, at.x) * 6.0 / TAU).rem_euclid(1.0) < 0.5;
         match radius {
             r if r > 1.0 => cloth,
             r if r > 0.86 => self.contrasted(to_linear(DARK), cloth),
@@ -190,7 +191,7 @@ impl Material {
         if !(0.160..=0.640).contains(&out) {
             return self.cloth(self.shirt[2], p, 0.62);
         }
-        let around = (p.y - ARM_Y as f32).atan2(p.z - ARM_Z as f32) / TAU;
+        let around = portable::atan2(p.y - ARM_Y as f32, p.z - ARM_Z as f32) / TAU;
         let repeats = (6.0 / self.look.pattern_scale as f32).round().max(1.0);
         let mut colour = self.pattern(Vec2::new(out * self.rate(), around * repeats), self.shirt);
         // A line along the outside shows twists.
@@ -209,7 +210,7 @@ impl Material {
 
     fn trouser_leg(&self, p: Vec3) -> Finish {
         let axis = Vec2::new(0.098 * p.x.signum(), -0.01);
-        let around = ((p.x - axis.x) * p.x.signum()).atan2(p.z - axis.y) / TAU;
+        let around = portable::atan2((p.x - axis.x) * p.x.signum(), p.z - axis.y) / TAU;
         let [base, light] = self.trousers;
         let knee = Vec2::new(around / 0.11, (p.y - 0.50) / 0.06).abs().max_element() < 1.0;
         let fine = (p.y * 110.0).floor() + (around * 64.0).floor();
@@ -253,7 +254,7 @@ impl Material {
     fn head(&self, p: Vec3) -> Finish {
         let ear = p.x.abs() > 0.087 && p.y < 1.67;
         // The hairline falls from the forehead to the nape, with a parting of its own on the left.
-        let hairline = 1.612 + 0.80 * p.z - 0.012 * (p.x * 30.0).sin();
+        let hairline = 1.612 + 0.80 * p.z - 0.012 * portable::sin(p.x * 30.0);
         if p.y > hairline && !ear && p.y > 1.535 {
             let strands = noise::fractal(Vec3::new(p.x * 260.0, p.y * 26.0, p.z * 60.0), self.seed ^ 5);
             let colour = self.hair * (1.0 + 1.3 * self.contrast() * (strands - 0.5));

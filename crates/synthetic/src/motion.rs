@@ -2,6 +2,7 @@
 
 use super::parameters::Motion;
 use glam::{DQuat, DVec3};
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Pose, Skeleton};
 use std::f64::consts::TAU;
 
@@ -60,12 +61,12 @@ fn smooth(t: f64) -> f64 {
 }
 
 fn wave(cycles: f64, t: f64, phase: f64) -> f64 {
-    (TAU * (cycles * t + phase)).sin()
+    portable::sin(TAU * (cycles * t + phase))
 }
 
 /// Between 0 and 1, starting at 0.
 fn pulse(cycles: f64, t: f64) -> f64 {
-    0.5 - 0.5 * (TAU * cycles * t).cos()
+    0.5 - 0.5 * portable::cos(TAU * cycles * t)
 }
 
 /// A skeleton being posed, from the rest pose on.
@@ -82,7 +83,7 @@ impl Actor<'_> {
     /// skeleton lacks are left out.
     fn rotate(&mut self, joint: &str, [x, y, z]: [f64; 3]) {
         if let Some(i) = self.skeleton.names.iter().position(|name| name == joint) {
-            let about = |axis: DVec3, degrees: f64| DQuat::from_axis_angle(axis, degrees.to_radians());
+            let about = |axis: DVec3, degrees: f64| portable::from_axis_angle(axis, degrees.to_radians());
             let turn = about(DVec3::Z, z) * about(DVec3::Y, y) * about(DVec3::X, x);
             self.rotations[i] = turn * self.rotations[i];
         }
@@ -143,7 +144,8 @@ impl Actor<'_> {
             [30.0 * sway(2.0, 0.8), 0.0, 0.0],
         );
         for (side, shift) in [("left", 0.0), ("right", 0.5)] {
-            let lift = life * wave(3.0, t, shift).max(0.0).powi(2);
+            let raised = wave(3.0, t, shift).max(0.0);
+            let lift = life * (raised * raised);
             self.rotate(&format!("{side}_hip"), [-10.0 - 42.0 * lift, 0.0, 0.0]);
             self.rotate(&format!("{side}_knee"), [18.0 + 58.0 * lift, 0.0, 0.0]);
             self.rotate(&format!("{side}_ankle"), [-8.0 + 12.0 * lift, 0.0, 0.0]);
@@ -256,22 +258,23 @@ impl Actor<'_> {
 
     fn arm_turn(&mut self, motion: &Motion, t: f64) {
         let life = motion.liveliness;
-        self.rotations[0] = DQuat::from_rotation_y((25.0 * life * wave(1.0, t, 0.0)).to_radians())
-            * DQuat::from_rotation_x(TAU * motion.turns * t);
+        self.rotations[0] =
+            portable::from_axis_angle(DVec3::Y, (25.0 * life * wave(1.0, t, 0.0)).to_radians())
+                * portable::from_axis_angle(DVec3::X, TAU * motion.turns * t);
         for rotation in self.rotations.iter_mut().skip(1) {
-            *rotation = DQuat::from_rotation_z((12.0 * life * wave(2.0, t, 0.1)).to_radians());
+            *rotation = portable::from_axis_angle(DVec3::Z, (12.0 * life * wave(2.0, t, 0.1)).to_radians());
         }
     }
 
     /// Turns every joint but the root by an axis-angle in degrees.
     fn arm_joints(&mut self, degrees: DVec3) {
-        let turn = DQuat::from_scaled_axis(degrees * (TAU / 360.0));
+        let turn = portable::from_scaled_axis(degrees * (TAU / 360.0));
         self.rotations.iter_mut().skip(1).for_each(|rotation| *rotation = turn);
     }
 
     /// The pose, with the lower foot on the ground and both feet about the origin; an arm is held by its middle.
     fn pose(&self) -> Pose {
-        let axis_angles: Vec<DVec3> = self.rotations.iter().map(|q| q.to_scaled_axis()).collect();
+        let axis_angles: Vec<DVec3> = self.rotations.iter().map(|&q| portable::to_scaled_axis(q)).collect();
         let mut pose = Pose::from_axis_angles(self.skeleton, &axis_angles, DVec3::ZERO);
         let rest = self.skeleton.world_transforms(&self.skeleton.rest_locals);
         let posed = self.skeleton.world_transforms(&pose.locals);

@@ -6,7 +6,7 @@ use skinsplat_core::scene::{SceneError, camera::MAX_IMAGE_SIDE};
 use skinsplat_data::Capture;
 
 /// Raised whenever the same parameters would give other bodies, motions or images.
-pub const GENERATOR_VERSION: u32 = 1;
+pub const GENERATOR_VERSION: u32 = 2;
 
 /// All parameters of a subject. Every field has a default; unknown fields are refused.
 ///

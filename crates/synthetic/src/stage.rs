@@ -2,6 +2,7 @@
 
 use super::parameters::{Parameters, Rig};
 use glam::DVec3;
+use skinsplat_core::math::portable::{cos, sin};
 use skinsplat_core::scene::Camera;
 use skinsplat_data::Capture;
 use std::f64::consts::TAU;
@@ -29,7 +30,7 @@ pub(super) fn cameras(parameters: &Parameters, role: Role) -> Vec<Camera> {
     let focal = f64::from(side) / 2.0 * framing.distance / framing.half_extent;
     let camera = |azimuth: f64, elevation: f64| {
         let direction =
-            DVec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos());
+            DVec3::new(sin(azimuth) * cos(elevation), sin(elevation), cos(azimuth) * cos(elevation));
         let eye = framing.target + direction * framing.distance;
         Camera::look_at(eye, framing.target, DVec3::Y, focal, side, side)
     };

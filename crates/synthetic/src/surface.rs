@@ -8,6 +8,7 @@ use super::cell::{edge, mean_crossing, sheets_of_all_cases};
 use super::field::Field;
 use glam::DVec3;
 use rayon::prelude::*;
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::SceneError;
 
 /// A place that is sampled more finely, smoothly falling off around it.
@@ -121,7 +122,7 @@ impl<'a> Region<'a> {
 /// # Errors
 /// If no attempt gives a sphere; the field is named `rig.edge`.
 pub(super) fn mesh(field: &Field, cell: f64, lenses: &[Lens]) -> Result<Mesh, SceneError> {
-    let mut attempts = (0..ATTEMPTS).map(|k| attempt(field, cell * FINER.powi(k), lenses));
+    let mut attempts = (0..ATTEMPTS).map(|k| attempt(field, cell * portable::powi(FINER, k), lenses));
     attempts.find(Mesh::is_sphere).ok_or_else(|| {
         SceneError::new("rig.edge", format!("{cell} m gives a surface with handles"), "a shorter edge")
     })

@@ -5,6 +5,7 @@ use super::lighting::{self, Finish};
 use super::material::Material;
 use super::parameters::{Lights, Rig};
 use glam::{DMat3, Quat, Vec3};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::rotation::nearest_rotation;
 use skinsplat_core::scene::{Camera, Pose, PosedBody, SceneError};
 use skinsplat_render::mesh::{self, Drawing, Fragment, SamplePattern};
@@ -61,7 +62,7 @@ impl Model {
             Rig::Figure(_) => self.material.figure(position),
             Rig::Arm(shape) => {
                 let metres = position * Vec3::new((shape.length / f64::from(shape.bones)) as f32, 1.0, 1.0);
-                self.material.arm(metres, position.x, position.y.atan2(position.z))
+                self.material.arm(metres, position.x, portable::atan2(position.y, position.z))
             }
         }
     }

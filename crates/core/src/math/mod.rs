@@ -7,6 +7,7 @@
 pub mod average;
 pub mod dual_quaternion;
 pub mod matrix3;
+pub mod portable;
 pub mod random;
 mod real;
 pub mod rotation;

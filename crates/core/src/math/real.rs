@@ -99,7 +99,7 @@ macro_rules! real {
             }
             #[inline(always)]
             fn atan2(self, x: Self) -> Self {
-                $type::atan2(self, x)
+                super::portable::atan2(self, x)
             }
             #[inline(always)]
             fn is_finite(self) -> bool {

@@ -1,6 +1,7 @@
 //! Canonical Gaussians and how they hang on a body.
 
 use super::{RestBody, SceneError, SkinWeights};
+use crate::math::portable;
 use glam::Vec3;
 
 /// Gaussians with the parameters of a 3DGS PLY, as stored there: nothing activated, so that a file round-trips bit for
@@ -59,7 +60,7 @@ impl Gaussians {
     /// The opacity of Gaussian `i`.
     #[inline]
     pub fn opacity(&self, i: usize) -> f32 {
-        1.0 / (1.0 + (-self.opacity_logits[i]).exp())
+        1.0 / (1.0 + portable::exp(-self.opacity_logits[i]))
     }
 
     /// Checks that all arrays have the same length, that every value is finite, that no quaternion is zero and that

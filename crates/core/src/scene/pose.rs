@@ -1,6 +1,7 @@
 //! A pose: one local transform per skeleton node, and a translation of the whole body.
 
 use super::{LocalTransform, Skeleton};
+use crate::math::portable;
 use glam::{DQuat, DVec3};
 
 /// The state of a skeleton in one frame.
@@ -23,7 +24,7 @@ impl Pose {
     /// A pose of an SMPL-style skeleton (identity rest rotations) from axis-angle vectors, radians, one per joint.
     /// Missing joints keep their rest transform.
     pub fn from_axis_angles(skeleton: &Skeleton, axis_angles: &[DVec3], translation: DVec3) -> Self {
-        let rotations: Vec<DQuat> = axis_angles.iter().map(|&r| DQuat::from_scaled_axis(r)).collect();
+        let rotations: Vec<DQuat> = axis_angles.iter().map(|&r| portable::from_scaled_axis(r)).collect();
         let mut locals = skeleton.rest_locals.clone();
         for (local, rotation) in locals.iter_mut().zip(&rotations) {
             local.rotation = *rotation;

@@ -1,6 +1,7 @@
 //! The waist of the program: what a strategy produces and the renderer draws.
 
 use super::{Gaussians, Image};
+use crate::math::portable;
 use glam::{Mat3, Vec3};
 
 /// How a colour leaves the SH evaluation.
@@ -94,7 +95,7 @@ impl OwnedPosed {
             .zip(&gaussians.log_scales)
             .map(|(&[w, x, y, z], log_scale)| {
                 Mat3::from_quat(glam::Quat::from_xyzw(x, y, z, w))
-                    * Mat3::from_diagonal(log_scale.map(f32::exp))
+                    * Mat3::from_diagonal(log_scale.map(portable::exp))
             })
             .collect();
         Self {

@@ -7,6 +7,7 @@ use crate::digest::Fingerprint;
 use ::gltf::accessor::{DataType, Dimensions, Item};
 use ::gltf::animation::{Channel as GltfChannel, Interpolation, Property};
 use glam::{DQuat, DVec3, DVec4};
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Pose, SceneError};
 
 /// No clip of more poses times joints than this is sampled at its keys.
@@ -121,7 +122,7 @@ impl Channel {
             Interpolation::CubicSpline => self.hermite(before, span, t),
             _ if self.property == Property::Rotation => {
                 let [a, b] = [before, next].map(|k| unit(DQuat::from_vec4(self.key(k))));
-                DVec4::from(a.slerp(b, t))
+                DVec4::from(portable::slerp(a, b, t))
             }
             _ => self.key(before).lerp(self.key(next), t),
         }

@@ -7,6 +7,7 @@
 
 use super::Window;
 use rayon::prelude::*;
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::Image;
 
 /// Radius of the window.
@@ -108,7 +109,7 @@ impl Sources<'_> {
 fn taps() -> [f32; TAPS] {
     let weight = |k: usize| {
         let d = k as f64 - RADIUS as f64;
-        (-d * d / (2.0 * 1.5 * 1.5)).exp()
+        portable::exp(-d * d / (2.0 * 1.5 * 1.5))
     };
     let sum: f64 = (0..TAPS).map(weight).sum();
     std::array::from_fn(|k| (weight(k) / sum) as f32)

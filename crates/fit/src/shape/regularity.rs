@@ -75,7 +75,7 @@ impl<'a> Regularity<'a> {
             let ratio = along(edge).length() / rest;
             // around one: a variance as the difference of two large numbers would lose digits
             sum += ratio - 1.0;
-            squares += (ratio - 1.0).powi(2);
+            squares += (ratio - 1.0) * (ratio - 1.0);
         }
         let mean = sum / count;
         for (edge, rest) in edges() {

@@ -1,5 +1,7 @@
 //! A Gaussian filter over a window of pixels.
 
+use skinsplat_core::math::portable;
+
 /// A separable, truncated Gaussian that sums to one; outside of the window everything is zero, so that the filter is a
 /// symmetric matrix and its own adjoint.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,7 +14,8 @@ impl Blur {
     /// A filter of a standard deviation in pixels, cut off beyond `reach` of them; zero changes nothing.
     pub(crate) fn new(sigma: f64, reach: f64) -> Self {
         let reach = (reach * sigma).ceil() as usize;
-        let at = |k: usize| if k == 0 { 1.0 } else { (-0.5 * (k as f64 / sigma).powi(2)).exp() };
+        let bell = |x: f64| portable::exp(-0.5 * (x * x));
+        let at = |k: usize| if k == 0 { 1.0 } else { bell(k as f64 / sigma) };
         let weights: Vec<f64> = (0..=reach).map(at).collect();
         let sum = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
         Self { weights: weights.iter().map(|w| w / sum).collect() }

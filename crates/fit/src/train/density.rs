@@ -8,6 +8,7 @@ use crate::recipe::Densify;
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, Binding, Gaussians, PosedGradient, RestBody, SceneError, SkinWeights};
 use skinsplat_posing::nearest::NearestFace;
 
@@ -30,7 +31,7 @@ impl Density {
         let seen = gradient.screen.iter().zip(&gradient.radii);
         for ((sum, count), (slope, &radius)) in self.sums.iter_mut().zip(&mut self.counts).zip(seen) {
             if radius > 0.0 {
-                *sum += slope[0].hypot(slope[1]);
+                *sum += portable::hypot(slope[0], slope[1]);
                 *count += 1;
             }
         }
@@ -135,7 +136,7 @@ fn fates(settings: &Densify, gaussians: &Gaussians, density: &Density) -> Vec<Fa
         .collect();
     wanted.sort_by(|&a, &b| density.mean(b).total_cmp(&density.mean(a)).then(a.cmp(&b)));
     for i in wanted.into_iter().take(most.saturating_sub(kept)) {
-        let large = gaussians.log_scales[i].max_element().exp() > settings.split_above;
+        let large = portable::exp(gaussians.log_scales[i].max_element()) > settings.split_above;
         fates[i] = if large { Fate::Split } else { Fate::Clone };
     }
     fates
@@ -169,8 +170,8 @@ impl Next {
         };
         let [w, x, y, z] = from.rotations[i];
         let axis = Quat::from_xyzw(x, y, z, w).normalize() * longest;
-        let (apart, shrink) = half.map_or((0.0, 0.0), |(apart, shrink)| (apart, shrink.ln()));
-        let shift = axis * (apart * log_scale.max_element().exp());
+        let (apart, shrink) = half.map_or((0.0, 0.0), |(apart, shrink)| (apart, portable::ln(shrink)));
+        let shift = axis * (apart * portable::exp(log_scale.max_element()));
         let to = &mut self.gaussians;
         to.sh_degree = from.sh_degree;
         to.means.push(from.means[i] + shift);

@@ -27,6 +27,7 @@ use frames::TrainingFrames;
 use layer::Layer;
 use parameters::{Parameters, RatesNow};
 use serde::{Deserialize, Serialize};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::scene::{
     Avatar, AvatarGradient, Binding, Image, Mask, PosedBody, PosedGradient, Rendered, RenderedGradient,
@@ -341,7 +342,7 @@ impl<'a> Trainer<'a> {
             iteration: self.iteration,
             iterations,
             loss: total,
-            psnr: -10.0 * loss.mse.max(1e-12).log10(),
+            psnr: -10.0 * portable::log10(loss.mse.max(1e-12)),
             splats: self.parameters.len(),
         })
     }

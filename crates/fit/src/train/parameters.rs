@@ -5,6 +5,7 @@ use crate::options::Moments;
 use crate::recipe::{Free, FreePosition, FreeRotation, FreeScale, Recipe};
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::{Avatar, AvatarGradient, Binding, Gaussians};
 
@@ -58,7 +59,7 @@ impl RatesNow {
         let done = f64::from(iteration) / f64::from(iterations.max(2) - 1);
         let fallen = if rates.position > 0.0 && rates.position_last > 0.0 {
             let (first, last) = (f64::from(rates.position), f64::from(rates.position_last));
-            (first * (last / first).powf(done)) as f32
+            (first * portable::pow(last / first, done)) as f32
         } else {
             rates.position
         };
@@ -247,7 +248,7 @@ impl Parameters {
 impl Origin {
     /// The starting rotation turned about its third axis.
     fn turned_by(&self, angle: f32) -> [f32; 4] {
-        let (sin, cos) = (0.5 * angle).sin_cos();
+        let (sin, cos) = portable::sin_cos(0.5 * angle);
         let q = quat(self.rotation) * Quat::from_xyzw(0.0, 0.0, sin, cos);
         [q.w, q.x, q.y, q.z]
     }

@@ -4,6 +4,7 @@ use super::parameters::Origin;
 use crate::recipe::LossTerms;
 use glam::Vec3;
 use rayon::prelude::*;
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, AvatarGradient, Binding};
 
 /// Adds the derivatives of all terms to `gradient` and returns their weighted sum.
@@ -17,7 +18,7 @@ pub(super) fn add(
     let mut total = 0.0;
     if terms.long_thin > 0.0 || terms.scale > 0.0 {
         for (log_scale, out) in avatar.gaussians.log_scales.iter().zip(&mut gradient.log_scales) {
-            let scale = log_scale.map(f32::exp);
+            let scale = log_scale.map(portable::exp);
             let square = scale * scale;
             let weight = terms.scale / (3.0 * n);
             total += f64::from(weight * square.element_sum());
@@ -28,7 +29,7 @@ pub(super) fn add(
     if terms.opacity > 0.0 {
         let weight = terms.opacity / n;
         for (logit, out) in avatar.gaussians.opacity_logits.iter().zip(&mut gradient.opacity_logits) {
-            let opacity = 1.0 / (1.0 + (-logit).exp());
+            let opacity = 1.0 / (1.0 + portable::exp(-logit));
             total += f64::from(weight * opacity * opacity);
             *out += 2.0 * weight * opacity * opacity * (1.0 - opacity);
         }

@@ -110,7 +110,8 @@ impl<'a> Comparison<'a> {
             Covariance::Population => 1.0,
             Covariance::Sample => taps * taps / (taps * taps - 1.0),
         };
-        let constants = Constants { c1: (0.01 * range).powi(2), c2: (0.03 * range).powi(2), covariance };
+        let square = |x: f64| x * x;
+        let constants = Constants { c1: square(0.01 * range), c2: square(0.03 * range), covariance };
         let factor = match settings.downsample {
             true => (a.width().min(a.height()) as f64 / 256.0).round_ties_even().max(1.0) as usize,
             false => 1,

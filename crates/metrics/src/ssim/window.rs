@@ -1,6 +1,7 @@
 //! Windows as sums of separable terms.
 
 use super::{Precision, WindowShape};
+use skinsplat_core::math::portable;
 
 /// A symmetric odd window as `Σ_t vertical_t ⊗ horizontal_t`. Each filter is given by its half: `[k]` is the weight at
 /// distance k from the centre.
@@ -41,7 +42,7 @@ fn gaussian(radius: usize, sigma: f64) -> Vec<f64> {
 }
 
 fn bell(k: usize, sigma: f64) -> f64 {
-    (-((k * k) as f64) / (2.0 * sigma * sigma)).exp()
+    portable::exp(-((k * k) as f64) / (2.0 * sigma * sigma))
 }
 
 /// The window as 3DGS builds it in f32: taps rounded, their sum and the quotients rounded, and the outer product rounded

@@ -5,6 +5,7 @@ use super::super::{BoundAvatar, LbsProjection, RotationChoice};
 use super::theory::{self, Spread, rounding};
 use glam::DMat3;
 use skinsplat_core::math::average::{Solver, Start};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::{Quaternion, dot4, rotation};
 use skinsplat_core::scene::PosedBody;
 
@@ -33,7 +34,7 @@ struct Angle {
 
 fn angle(p: Quaternion<f64>, q: Quaternion<f64>) -> Angle {
     let half = 0.5 * rotation::angle_between(p, q);
-    let (sine, cosine) = half.sin_cos();
+    let (sine, cosine) = portable::sin_cos(half);
     Angle { half, sine, cosine: cosine.max(0.0) }
 }
 
@@ -148,7 +149,7 @@ impl<'a> PoseBounds<'a> {
             _ if spread.bones == 1 => 0.0,
             Solver::Power { steps, start } => theory::power(spread, self.start(start, group, spread), steps),
             Solver::Squaring { doublings } => {
-                theory::column(spread.ratio(), 2f64.powi(doublings.min(1000) as i32), 0.0)
+                theory::column(spread.ratio(), portable::powi(2.0, doublings.min(1000) as i32), 0.0)
             }
             Solver::Nlerp => theory::sum(spread),
         }
@@ -180,7 +181,7 @@ fn spread(group: &Group, quats: &[Quaternion<f64>]) -> Spread {
     let angles: Vec<Angle> = group.joints.iter().map(|&joint| angle(heaviest, quat(joint))).collect();
     let mut order: Vec<usize> = (0..angles.len()).filter(|&j| j != group.heaviest).collect();
     order.sort_by(|&i, &j| angles[j].half.total_cmp(&angles[i].half));
-    let off = group.most(&order, |j| angles[j].sine.powi(2));
+    let off = group.most(&order, |j| angles[j].sine * angles[j].sine);
     order.sort_by(|&i, &j| {
         (angles[j].sine * angles[j].cosine).total_cmp(&(angles[i].sine * angles[i].cosine))
     });

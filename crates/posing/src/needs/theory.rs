@@ -37,6 +37,7 @@
 //! at most ε max(sin β_j cos β_j)/(1 − ε) across and takes at most ε/(1 − ε) off the distance on the diagonal. As for the
 //! heaviest bone, tan 2θ ≤ ε max(sin 2β_j) / (ρ − ε).
 
+use skinsplat_core::math::portable::{self, atan, pow, tan};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 /// Unit round-off of `f32`.
@@ -72,7 +73,7 @@ impl Spread {
         let lead = 1.0 - 2.0 * off;
         let gap = (1.0 - 2.0 * d).max(0.0).sqrt().max(lead).clamp(0.0, 1.0);
         let known = lead > LEAST_GAP || bones == 2 && gap > LEAST_GAP;
-        let heaviest = if known { 0.5 * (2.0 * across).atan2(lead) } else { FRAC_PI_2 };
+        let heaviest = if known { 0.5 * portable::atan2(2.0 * across, lead) } else { FRAC_PI_2 };
         Self { gap, heaviest, reach, bones, imbalance }
     }
 
@@ -92,7 +93,7 @@ pub(super) fn power(spread: &Spread, start: f64, steps: u32) -> f64 {
     if spread.gap <= LEAST_GAP || start >= FRAC_PI_2 {
         return f64::INFINITY;
     }
-    2.0 * (spread.ratio().powf(f64::from(steps)) * start.tan()).atan()
+    2.0 * atan(pow(spread.ratio(), f64::from(steps)) * tan(start))
 }
 
 /// The quaternion angle by which any bone can miss.
@@ -103,7 +104,7 @@ pub(super) fn any_bone(spread: &Spread, from_heaviest: f64) -> f64 {
 /// The angle of the rotation by which the largest column of A^power misses, `excess` = |Σ w − 1| added to the diagonal of 4 A
 /// where it is read from a blend.
 pub(super) fn column(ratio: f64, power: f64, excess: f64) -> f64 {
-    let r = ratio.powf(power);
+    let r = pow(ratio, power);
     let denominator = 1.0 - 3.0 * r - COLUMN_SLACK;
     if denominator <= 0.0 {
         return f64::INFINITY;
@@ -115,7 +116,7 @@ pub(super) fn column(ratio: f64, power: f64, excess: f64) -> f64 {
     } else {
         r
     };
-    2.0 * (step * ((3.0 - r + COLUMN_SLACK) / denominator).sqrt()).atan()
+    2.0 * atan(step * ((3.0 - r + COLUMN_SLACK) / denominator).sqrt())
 }
 
 /// The angle of the rotation by which the normalised sum on the heaviest bone's side misses.
@@ -128,7 +129,8 @@ pub(super) fn sum(spread: &Spread) -> f64 {
         return f64::INFINITY;
     }
     let leading = 0.5 * (1.0 + spread.gap);
-    2.0 * ((0.5 * beta).tan().powi(2) * (1.0 - leading).sqrt() / leading).atan()
+    let slope = tan(0.5 * beta);
+    2.0 * atan(slope * slope * (1.0 - leading).sqrt() / leading)
 }
 
 /// Two bones at the quaternion angle h, weights (1 ± κ)/2 with κ at least `imbalance`. In the frame of the bisector the
@@ -136,13 +138,13 @@ pub(super) fn sum(spread: &Spread) -> f64 {
 /// 2(φ − ψ) ≥ 0. With τ = tan(h/2) the derivative in κ vanishes where κ² (3 + τ²) = 1 − τ², the maximum; beyond it the
 /// difference falls.
 fn two_bone_sum(h: f64, imbalance: f64) -> f64 {
-    let tau = (0.5 * h).tan();
+    let tau = tan(0.5 * h);
     let worst = ((1.0 - tau * tau).max(0.0) / (3.0 + tau * tau)).sqrt();
     let kappa = worst.max(imbalance);
     if h >= FRAC_PI_2 - LEAST_GAP && kappa <= LEAST_GAP {
         return f64::INFINITY;
     }
-    let miss = (kappa * h.sin()).atan2(h.cos()) - 2.0 * (kappa * tau).atan();
+    let miss = portable::atan2(kappa * portable::sin(h), portable::cos(h)) - 2.0 * atan(kappa * tau);
     miss.max(0.0)
 }
 
@@ -151,7 +153,7 @@ pub(super) fn gram_schmidt(gap: f64) -> f64 {
     if gap <= LEAST_GAP {
         return f64::INFINITY;
     }
-    2.0 * ((1.0 - gap.sqrt()) / (1.0 + gap).sqrt()).clamp(0.0, 1.0).asin()
+    2.0 * portable::asin(((1.0 - gap.sqrt()) / (1.0 + gap).sqrt()).clamp(0.0, 1.0))
 }
 
 /// The angle of the rotation by which the average misses when bones of total weight `dropped` are left out.
@@ -160,9 +162,9 @@ pub(super) fn fewer(spread: &Spread, dropped: f64) -> f64 {
         return 0.0;
     }
     let beta = spread.farthest();
-    let across = if beta < FRAC_PI_4 { (2.0 * beta).sin() } else { 1.0 };
+    let across = if beta < FRAC_PI_4 { portable::sin(2.0 * beta) } else { 1.0 };
     let room = spread.gap - dropped;
-    if room > LEAST_GAP { (dropped * across).atan2(room) } else { f64::INFINITY }
+    if room > LEAST_GAP { portable::atan2(dropped * across, room) } else { f64::INFINITY }
 }
 
 /// What rounding may add, radians of rotation. An allowance, not a theorem: the first-order terms of the error analysis,

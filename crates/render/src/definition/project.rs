@@ -4,6 +4,7 @@ use super::Cutoffs;
 use crate::View;
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::rasterizer::{self, DEVIATIONS, LEAST_DISCRIMINANT, LOW_PASS};
 use skinsplat_core::scene::{Camera, ColourClamp, Posed};
 
@@ -34,7 +35,7 @@ impl Splat {
 
     /// As if it reached everywhere.
     pub(super) fn alpha(&self, pixel: [usize; 2]) -> f64 {
-        (self.opacity * self.power(pixel).exp()).min(MAX_ALPHA)
+        (self.opacity * portable::exp(self.power(pixel))).min(MAX_ALPHA)
     }
 
     /// Where it reaches.
@@ -75,7 +76,8 @@ fn project(posed: &Posed, i: usize, view: &View, cutoffs: Cutoffs) -> Option<Spl
     let (from, to) = if cutoffs.three_sigma {
         tiles_touched(mean, footprint.radius())
     } else {
-        let reach = (2.0 * (opacity / cutoffs.alpha).ln().max(0.0) * footprint.variances()).powf(0.5);
+        let reach =
+            (2.0 * portable::ln(opacity / cutoffs.alpha).max(0.0) * footprint.variances()).map(f64::sqrt);
         ((mean - reach).ceil(), (mean + reach).floor() + 1.0)
     };
     let (from, to) = (from.clamp(DVec2::ZERO, size), to.clamp(DVec2::ZERO, size));

@@ -5,6 +5,7 @@ use super::method::{Answer, METHODS, Method};
 use super::problem::{FAMILIES, Family, Problem, random_rotation};
 use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, exactly, shown};
 use rayon::prelude::*;
+use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::math::rotation::angle_between;
 use skinsplat_core::math::{Matrix3, Quaternion, Real, matrix3, rotation};
@@ -89,7 +90,7 @@ fn measure<T: Real>(posed: &Posed<T>, answer: Option<Answer>) -> Option<Measured
         let loss = posed.exact.loss(answer.quat);
         // Second order in the angle: what is lost is judged as the angle that would lose it where the gap is wide.
         let as_degrees =
-            2.0 * (loss - 32.0 * T::EPSILON.to_f64()).max(0.0).sqrt().min(1.0).asin().to_degrees();
+            2.0 * portable::asin((loss - 32.0 * T::EPSILON.to_f64()).max(0.0).sqrt().min(1.0)).to_degrees();
         (
             Verdict::of(as_degrees, LIMITS.degrees),
             format!("not determined by the input; loses {} of λ1", shown(loss)),

@@ -5,6 +5,7 @@
 
 use super::double_double::DoubleDouble;
 use skinsplat_core::math::average::{Solver, average};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::{Quaternion, dot4};
 
 /// 2^70 power steps: a relative gap of 1e-18 is resolved.
@@ -51,7 +52,7 @@ impl Exact {
     pub(super) fn error_degrees(&self, q: Quaternion<f64>) -> f64 {
         let near = self.projector.map(|row| dot4(row, q));
         let off = [0, 1, 2, 3].map(|k: usize| q[k] - near[k]);
-        2.0 * dot4(off, off).sqrt().min(1.0).asin().to_degrees()
+        2.0 * portable::asin(dot4(off, off).sqrt().min(1.0)).to_degrees()
     }
 
     /// 1 − qᵀAq/λ1 of a unit quaternion: how much worse than the average it is, whatever the gap.
@@ -68,7 +69,7 @@ fn outer_sum(quats: &[Quaternion<f64>], weights: &[f64]) -> Matrix4<DoubleDouble
     for (q, &weight) in quats.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
         let largest = q.iter().fold(0.0f64, |m, c| m.max(c.abs()));
         // A power of two, so that nothing is rounded.
-        let scale = (-largest.log2().floor()).exp2();
+        let scale = portable::exp2(-portable::log2(largest).floor());
         let q = q.map(|c| DoubleDouble::new(c * scale));
         let squared = q.iter().fold(DoubleDouble::default(), |sum, &c| sum + c * c);
         let weight = DoubleDouble::new(weight) * inverse * squared.reciprocal();

@@ -7,6 +7,7 @@ use glam::{DMat3, DQuat, DVec3, Mat3};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 use skinsplat_core::math::Quaternion;
+use skinsplat_core::math::portable;
 use skinsplat_core::math::rotation::{angle_between, multiply};
 use skinsplat_core::scene::{OwnedPosed, Pose, PosedBody, RestBody};
 use skinsplat_posing::{BoundAvatar, PosingError, Strategy, pose};
@@ -84,7 +85,7 @@ impl Stage<'_> {
         let body = PosedBody::new(self.body, at)?;
         let here = on(self.one, || pose(self.bound, &body, strategy))?;
         let again = on(self.two, || pose(self.bound, &body, strategy))?;
-        let turn = DQuat::from_scaled_axis(DVec3::new(0.7, -1.1, 0.4));
+        let turn = portable::from_scaled_axis(DVec3::new(0.7, -1.1, 0.4));
         let moved = stage::moved(at, turn, DVec3::ZERO);
         let moved = PosedBody::new(self.body, &moved)?;
         let there = on(self.one, || pose(self.bound, &moved, strategy))?;

@@ -1,5 +1,6 @@
 //! Hard rotation averages: families of problems along an axis, from easy to impossible.
 
+use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::math::{Quaternion, rotation};
 
@@ -46,14 +47,14 @@ pub(super) fn random_rotation(random: &mut SplitMix64) -> Quaternion<f64> {
 
 /// A turn by `degrees` about an axis that no coordinate prefers.
 fn turn(degrees: f64) -> Quaternion<f64> {
-    let (sin, cos) = (0.5 * degrees.to_radians()).sin_cos();
+    let (sin, cos) = portable::sin_cos(0.5 * degrees.to_radians());
     let [x, y, z] = [0.48, -0.64, 0.6].map(|c| c * sin);
     [cos, x, y, z]
 }
 
 /// A turn by 180 degrees less `short`, without cancellation.
 fn nearly_half_turn(short: f64) -> Quaternion<f64> {
-    let (sin, cos) = (0.5 * short.to_radians()).sin_cos();
+    let (sin, cos) = portable::sin_cos(0.5 * short.to_radians());
     let [x, y, z] = [0.48, -0.64, 0.6].map(|c| c * cos);
     [sin, x, y, z]
 }
@@ -76,7 +77,7 @@ fn random_bones(n: f64, spread: Option<f64>, seed: u64) -> Problem {
         Some(degrees) => {
             let [_, x, y, z] = random_rotation(random);
             let length = (x * x + y * y + z * z).sqrt().max(1e-9);
-            let (sin, cos) = (0.5 * (degrees * f64::from(random.unit_f32())).to_radians()).sin_cos();
+            let (sin, cos) = portable::sin_cos(0.5 * (degrees * f64::from(random.unit_f32())).to_radians());
             [cos, x / length * sin, y / length * sin, z / length * sin]
         }
     };

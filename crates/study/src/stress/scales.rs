@@ -3,6 +3,7 @@
 use super::stage;
 use super::table::{Cell, Findings, Grid, LIMITS, Row, Verdict, shown};
 use glam::{DVec3, Vec3};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::math::{Quaternion, Real, sh};
 use skinsplat_core::scene::{Avatar, PosedBody, RestBody};
@@ -112,10 +113,12 @@ fn factor_error(
     let factors = if mixes { [factors[1]; 3] } else { factors };
     let ordinary = columns(&avatar)?;
     let logs = ORDINARY.to_array().map(f64::from);
-    let scaled = [0, 1, 2].map(|k: usize| (logs[k] * factors[k]).ln() as f32);
+    let scaled = [0, 1, 2].map(|k: usize| portable::ln(logs[k] * factors[k]) as f32);
     avatar.gaussians.log_scales.fill(Vec3::from_array(scaled));
     // The logarithm in f32 costs its size in ulp: the scale that it stands for is the reference.
-    let actual = [0, 1, 2].map(|k: usize| f64::from(scaled[k]).exp() / f64::from(ORDINARY[k].ln()).exp());
+    let actual = [0, 1, 2].map(|k: usize| {
+        portable::exp(f64::from(scaled[k])) / portable::exp(f64::from(portable::ln(ORDINARY[k])))
+    });
     let extreme = columns(&avatar)?;
     let error = |(a, b): (&[DVec3; 3], &[DVec3; 3])| {
         (0..3).map(|k| (a[k] * actual[k] - b[k]).length() / (a[k].length() * actual[k])).fold(0.0, worse)
@@ -144,7 +147,7 @@ fn coefficients(findings: &mut Findings) {
     ];
     for precision in ["f32", "f64"] {
         for (name, angle) in angles {
-            let (sin, cos) = (0.5 * angle).sin_cos();
+            let (sin, cos) = portable::sin_cos(0.5 * angle);
             let turn = [cos, 0.48 * sin, -0.64 * sin, 0.6 * sin];
             let errors = [1e-12, 1.0, 1e4, 1e30].map(|size| sh_error(precision, turn, size));
             for (size, error) in [1e-12, 1.0, 1e4, 1e30].into_iter().zip(errors) {

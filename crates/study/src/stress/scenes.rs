@@ -1,6 +1,7 @@
 //! Scenes that are hard to draw, in families along an axis.
 
 use glam::{DMat4, DVec3, Mat3, Quat, Vec3};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::scene::{Camera, OwnedPosed};
 
@@ -54,7 +55,7 @@ fn cloud(centre: DVec3) -> OwnedPosed {
         means.push((mean.as_dvec3() + centre).as_vec3());
         let axis = Vec3::new(number(-1.0, 1.0), number(-1.0, 1.0), number(-1.0, 1.0));
         let scales = Vec3::new(number(0.02, 0.1), number(0.02, 0.1), number(0.005, 0.02));
-        factors.push(Mat3::from_quat(Quat::from_scaled_axis(axis * 3.0)) * Mat3::from_diagonal(scales));
+        factors.push(Mat3::from_quat(turned(axis * 3.0)) * Mat3::from_diagonal(scales));
         opacities.push(number(0.2, 1.0));
         sh.push([number(-1.5, 1.5), number(-1.5, 1.5), number(-1.5, 1.5)]);
     }
@@ -85,9 +86,14 @@ fn shifted(distance: f64) -> Scene {
     }
 }
 
+/// The turn about an axis by its length in radians.
+fn turned(axis: Vec3) -> Quat {
+    portable::from_scaled_axis(axis.as_dvec3()).as_quat()
+}
+
 /// One Gaussian two metres away, as long as `ratio` times its thickness of 1 mm, slanted.
 fn needle(ratio: f64) -> Scene {
-    let turn = Mat3::from_quat(Quat::from_rotation_z(0.7) * Quat::from_rotation_y(0.2));
+    let turn = Mat3::from_quat(turned(Vec3::Z * 0.7) * turned(Vec3::Y * 0.2));
     let scales = Vec3::new((1e-3 * ratio) as f32, 1e-3, 1e-3);
     single(Vec3::new(0.0, 0.0, 2.0), turn * Mat3::from_diagonal(scales), 0.8)
 }
@@ -218,7 +224,7 @@ pub(super) const FAMILIES: [Family; 13] = [
         points: &[1e-2, 1e-4, 1e-8, 1e-12, 0.0],
         continuous: false,
         make: |s| {
-            let turn = Mat3::from_quat(Quat::from_rotation_y(1.57));
+            let turn = Mat3::from_quat(turned(Vec3::Y * 1.57));
             single(Vec3::new(0.1, 0.0, 2.0), turn * Mat3::from_diagonal(Vec3::new(0.1, 0.1, s as f32)), 0.8)
         },
     },

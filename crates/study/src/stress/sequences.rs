@@ -5,6 +5,7 @@ use super::stage::{self, PROBES};
 use super::table::{Cell, Findings, Grid, LIMITS, Row, Verdict, shown};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use skinsplat_core::math::portable::{cos, sin};
 use skinsplat_core::math::rotation::{angle_between, polar};
 use skinsplat_core::math::{Quaternion, dot4};
 use skinsplat_core::scene::{Pose, PosedBody, RestBody};
@@ -50,10 +51,9 @@ const SEQUENCES: [Sequence; 6] = [
         about: "three joints turn by up to 170° about axes that turn as well",
         angles: |t| {
             let axis = |k: f64| {
-                DVec3::new((5.0 * t + k).cos(), (4.0 * t + 2.0 * k).sin(), (3.0 * t + 3.0 * k).cos())
-                    .normalize()
+                DVec3::new(cos(5.0 * t + k), sin(4.0 * t + 2.0 * k), cos(3.0 * t + 3.0 * k)).normalize()
             };
-            let angle = (170.0 * (std::f64::consts::PI * t).sin()).to_radians();
+            let angle = (170.0 * sin(std::f64::consts::PI * t)).to_radians();
             [DVec3::ZERO, axis(0.0) * angle, axis(1.0) * angle, axis(2.0) * angle]
         },
     },

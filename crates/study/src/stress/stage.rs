@@ -2,6 +2,7 @@
 
 use glam::{DQuat, DVec3, Vec3};
 use skinsplat_core::math::average::Solver;
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, Binding, Gaussians, Pose, RestBody, SceneError, SkinWeights};
 use skinsplat_posing::{ColourChoice, CovarianceChoice, PRESETS, RotationChoice, Strategy};
 use skinsplat_synthetic::{ArmShape, Parameters, Rig, Subject};
@@ -63,7 +64,7 @@ pub(super) fn probes(body: &RestBody) -> Result<Avatar, SceneError> {
     let n = PROBES.len();
     let joint = moving_joint(body).x as f32;
     let place = |i: usize| {
-        let (sin, cos) = (i as f32).sin_cos();
+        let (sin, cos) = portable::sin_cos(i as f32);
         Vec3::new(joint, RADIUS as f32 * cos, RADIUS as f32 * sin)
     };
     let rows = PROBES.map(|(_, row)| row.to_vec());
@@ -89,7 +90,8 @@ pub(super) fn surface(body: &RestBody) -> Avatar {
         [q.w as f32, q.x as f32, q.y as f32, q.z as f32]
     };
     let colour = |vertex: &DVec3| {
-        let stripe = (6.0 * vertex.z.atan2(vertex.y) / std::f64::consts::TAU).rem_euclid(1.0) < 0.5;
+        let stripe =
+            (6.0 * portable::atan2(vertex.z, vertex.y) / std::f64::consts::TAU).rem_euclid(1.0) < 0.5;
         let ring = (vertex.x / 0.1).rem_euclid(1.0) < 0.5;
         match (stripe, ring) {
             (true, true) => [1.2, -0.9, -1.2],
@@ -101,7 +103,7 @@ pub(super) fn surface(body: &RestBody) -> Avatar {
     let gaussians = Gaussians {
         means: body.vertices.iter().map(|v| v.as_vec3()).collect(),
         rotations: normals.iter().map(frame).collect(),
-        log_scales: vec![Vec3::new(0.012, 0.005, 0.002).map(f32::ln); n],
+        log_scales: vec![Vec3::new(0.012, 0.005, 0.002).map(portable::ln); n],
         opacity_logits: vec![3.0; n],
         sh_degree: 0,
         sh: body.vertices.iter().map(colour).collect(),

@@ -1,6 +1,7 @@
 //! What was found, as data: one row per input, subject and precision, and where each subject breaks.
 
 use serde::{Serialize, Serializer};
+use skinsplat_core::math::portable;
 use std::fmt;
 
 /// A measured value, or the word that says why there is none. Never NaN.
@@ -56,7 +57,7 @@ pub(super) fn shown(value: f64) -> String {
     if value == 0.0 {
         "0".to_owned()
     } else if (1e-3..1e5).contains(&size) {
-        let digits = (2.0 - size.log10().floor()).clamp(0.0, 5.0) as usize;
+        let digits = (2.0 - portable::log10(size).floor()).clamp(0.0, 5.0) as usize;
         let text = format!("{value:.digits$}");
         if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
     } else {
@@ -210,9 +211,12 @@ pub struct Findings {
 pub(super) fn bisect(sound: f64, broken: f64, breaks: impl Fn(f64) -> bool) -> f64 {
     let logarithmic = sound > 0.0 && broken >= 0.0;
     let floor = 1e-40;
-    let (mut sound, mut broken) =
-        if logarithmic { (sound.log10(), broken.max(floor).log10()) } else { (sound, broken) };
-    let value = |x: f64| if logarithmic { 10f64.powf(x) } else { x };
+    let (mut sound, mut broken) = if logarithmic {
+        (portable::log10(sound), portable::log10(broken.max(floor)))
+    } else {
+        (sound, broken)
+    };
+    let value = |x: f64| if logarithmic { portable::pow(10.0, x) } else { x };
     for _ in 0..30 {
         let middle = 0.5 * (sound + broken);
         if breaks(value(middle)) {

@@ -2,6 +2,7 @@
 
 use super::Error;
 use serde::{Serialize, Serializer};
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::Image;
 use skinsplat_metrics::{ErrorSums, Planes, psnr::mean};
 
@@ -43,7 +44,7 @@ impl Fidelity {
         if mean_squared_error == 0.0 {
             Self::Exact
         } else {
-            Self::Decibels(-10.0 * mean_squared_error.log10())
+            Self::Decibels(-10.0 * portable::log10(mean_squared_error))
         }
     }
 

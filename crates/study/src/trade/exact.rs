@@ -5,6 +5,7 @@ use super::{Degrees, Error};
 use glam::{Mat3, Quat};
 use rayon::prelude::*;
 use skinsplat_core::math::average::{Solver, average};
+use skinsplat_core::math::portable;
 use skinsplat_core::math::{Quaternion, Real, rotation, sh};
 use skinsplat_core::scene::{Camera, Gaussians, OwnedPosed, Pose, PosedBody, RestBody, SkinWeights};
 use skinsplat_posing::{BoundAvatar, ColourChoice, Strategy, pose};
@@ -114,7 +115,7 @@ impl Shot {
         let factors = (0..self.means.len()).into_par_iter().map(|i| {
             let [w, x, y, z] = rig.drawn(i, turn(i)).map(|c| c as f32);
             Mat3::from_quat(Quat::from_xyzw(x, y, z, w).normalize())
-                * Mat3::from_diagonal(gaussians.log_scales[i].map(f32::exp))
+                * Mat3::from_diagonal(gaussians.log_scales[i].map(portable::exp))
         });
         let mut coefficients = gaussians.sh.clone();
         if gaussians.sh_degree > 0 {

@@ -1,6 +1,7 @@
 //! A motion that no body makes: every joint turned by nearly half a turn, where averages are nearly ties.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
+use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::scene::{Pose, Skeleton};
 
@@ -17,9 +18,9 @@ pub(super) fn extreme(skeleton: &Skeleton, from: &Pose, number: usize) -> Pose {
     for (node, local) in pose.locals.iter_mut().enumerate() {
         let axis = axis(&mut random);
         let [least, most] = FROM_HALF_TURN;
-        let short_by = least * (most / least).powf(f64::from(random.unit_f32()));
+        let short_by = least * portable::pow(most / least, f64::from(random.unit_f32()));
         if skeleton.parents[node].is_some() && node < skeleton.num_joints() {
-            let turn = DQuat::from_axis_angle(axis, (180.0 - short_by).to_radians());
+            let turn = portable::from_axis_angle(axis, (180.0 - short_by).to_radians());
             local.rotation = skeleton.rest_locals[node].rotation * turn;
         }
     }
@@ -31,7 +32,7 @@ pub(super) fn extreme(skeleton: &Skeleton, from: &Pose, number: usize) -> Pose {
 /// A direction, evenly over the sphere.
 fn axis(random: &mut SplitMix64) -> DVec3 {
     let z = 2.0 * f64::from(random.unit_f32()) - 1.0;
-    let (sin, cos) = (std::f64::consts::TAU * f64::from(random.unit_f32())).sin_cos();
+    let (sin, cos) = portable::sin_cos(std::f64::consts::TAU * f64::from(random.unit_f32()));
     let ring = (1.0 - z * z).max(0.0).sqrt();
     DVec3::new(ring * cos, ring * sin, z)
 }
@@ -39,6 +40,7 @@ fn axis(random: &mut SplitMix64) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DQuat;
 
     #[test]
     fn joints_turn_by_nearly_half_a_turn_and_roots_do_not() {

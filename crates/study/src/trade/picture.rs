@@ -2,6 +2,7 @@
 
 use super::section::{EQUAL_BELOW, EQUAL_BEYOND};
 use super::{Sweep, pareto_front};
+use skinsplat_core::math::portable;
 use skinsplat_plot::{Point, Scatter};
 
 /// Cost against error of the rows of one motion; none if nothing was measured. Angles are those that 95 % of the Gaussians
@@ -18,7 +19,7 @@ pub fn scatter(sweep: &Sweep, motion: &str) -> Option<Scatter> {
             let y = if by_angle {
                 outcome.degrees?.p95
             } else {
-                10.0_f64.powf(-outcome.fidelity?.decibels().min(EQUAL_BEYOND) / 20.0)
+                portable::pow(10.0, -outcome.fidelity?.decibels().min(EQUAL_BEYOND) / 20.0)
             };
             Some(Point { label: row.name(), x, y, on_front: false })
         })

@@ -2,6 +2,7 @@
 
 use super::{Degrees, Fidelity, Spread, pareto_front};
 use serde::Serialize;
+use skinsplat_core::math::portable;
 
 /// Errors below this, degrees, count as equal: quaternions are drawn from f32, which holds no more.
 pub(super) const EQUAL_BELOW: f64 = 1e-5;
@@ -295,7 +296,7 @@ pub(super) fn shown(value: f64) -> String {
     } else if size < 1e-3 {
         format!("{value:.1e}")
     } else {
-        let digits = (2.0 - size.log10().floor()).clamp(0.0, 5.0) as usize;
+        let digits = (2.0 - portable::log10(size).floor()).clamp(0.0, 5.0) as usize;
         format!("{value:.digits$}")
     }
 }

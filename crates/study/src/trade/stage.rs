@@ -2,6 +2,7 @@
 
 use super::exact::{Rig, Shot};
 use super::{Error, motion, sweep};
+use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, Binding, Camera, Image, Pose, Posed, RestBody, SceneError, SkinWeights};
 use skinsplat_data::select::evenly_spaced;
 use skinsplat_data::{Sequence, Subject};
@@ -227,7 +228,7 @@ fn sparser(avatar: &Avatar, most: usize, joints: usize) -> Result<Avatar, Error>
     let all: Vec<usize> = (0..avatar.gaussians.len()).collect();
     let kept = evenly_spaced(&all, Some(most));
     let mut sparse = sweep::subset(avatar, &kept, joints)?;
-    let wider = (0.5 * (all.len() as f64 / kept.len() as f64).ln()) as f32;
+    let wider = (0.5 * portable::ln(all.len() as f64 / kept.len() as f64)) as f32;
     sparse.gaussians.log_scales.iter_mut().for_each(|scale| *scale += wider);
     Ok(sparse)
 }
