@@ -97,7 +97,8 @@ fn experiments() -> Result<Table> {
 
 fn strategies() -> Table {
     let presets = PRESETS.iter().map(|p| (p.id.to_owned(), [p.title, p.summary]));
-    let variations = skinsplat_posing::variations().into_iter().map(|v| (format!("+{}", v.spec), ["", v.summary]));
+    let variations =
+        skinsplat_posing::variations().into_iter().map(|v| (format!("+{}", v.spec), ["", v.summary]));
     let rows = presets.chain(variations).map(|(id, texts)| (id, texts.map(str::to_owned)));
     listing("Strategies", [("title", "Title"), ("summary", "Summary")], rows)
 }
