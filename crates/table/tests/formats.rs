@@ -105,29 +105,116 @@ fn the_table_is_sound() {
 
 #[test]
 fn as_markdown() {
-    insta::assert_snapshot!(markdown(&everything()), @"");
+    insta::assert_snapshot!(markdown(&everything()), @r#"
+    ## Table #1: a\|b\\u{1b}[31m
+
+    Names such as `a|b_*c` are shown & 100 % safe.
+    A second sentence.
+
+    | Sequence | Variant | lab_1 PSNR ↑ | lab_1 ms ↓ | =lab\|2 Limit | =lab\|2 A &lt;word> |
+    | :-- | :-- | --: | --: | --: | :-- |
+    | anna | =SUM(A1) | 20.12 ± 0.25 | **1.5e−5** | breaks at −1e−9 | @home, or \`not\` |
+    |  | a\*b\_ | **∞** | 42.0 | holds | yes |
+    | bob \\u{202e} | plain | n/c <sup>2,1</sup> | — | — | no |
+    |  | paper | 20.10 | 1234 | — | -x |
+    |  | − paper | +0.12 | −1 | 0.00 | - |
+    | Mean | all | −0.50 | 7 | — |  |
+
+    <sup>1</sup> n/c: no weights for \`vgg\`
+
+    <sup>2</sup> one \| two
+
+    - Limit: where it \*breaks\*, by `axis|2`
+
+    A remark on `code_1` and &lt;all>.
+    "#);
 }
 
 #[test]
 fn as_csv() {
-    insta::assert_snapshot!(csv(&everything()), @"");
+    insta::assert_snapshot!(csv(&everything()), @r#"
+    sequence,variant,kind,frames,missing,lab_1 psnr,lab_1 time,'=lab|2 limit,'=lab|2 word,lab_1 psnr sd,'=lab|2 limit number,notes
+    anna,'=SUM(A1),measured,6,0,20.125,0.000015,breaks at -1e-9,"'@home, or `not`",0.25,-0.000000001,
+    anna,a*b_,measured,6,0,inf,42,holds,true,,,
+    bob \u{202e},plain,measured,6,2,,,,false,,,n/c: no weights for `vgg`; one | two
+    bob \u{202e},paper,paper,6,0,20.10,1234,,'-x,,,
+    bob \u{202e},− paper,difference,6,0,0.125,-1,-0.001,-,,,
+    Mean,all,mean,6,0,-0.5,7,,,,,
+    "#);
 }
 
 #[test]
 fn as_csv_by_cell() {
     let mut table = everything();
     table.rows.truncate(1);
-    insta::assert_snapshot!(csv_by_cell([&table]), @"");
+    insta::assert_snapshot!(csv_by_cell([&table]), @r#"
+    section,row,column,timing,value
+    every_thing,anna/spread,sequence,no,anna
+    every_thing,anna/spread,variant,no,'=SUM(A1)
+    every_thing,anna/spread,lab_1 psnr,no,20.125
+    every_thing,anna/spread,lab_1 psnr sd,no,0.25
+    every_thing,anna/spread,lab_1 time,yes,0.000015
+    every_thing,anna/spread,'=lab|2 limit,no,breaks at -1e-9
+    every_thing,anna/spread,'=lab|2 limit number,no,-0.000000001
+    every_thing,anna/spread,'=lab|2 word,no,"'@home, or `not`"
+    "#);
 }
 
 #[test]
 fn as_latex() {
-    insta::assert_snapshot!(latex(&everything()), @"");
+    insta::assert_snapshot!(latex(&everything()), @r#"
+    \begin{table}
+    \centering
+    \caption{Names such as \texttt{a|b\_*c} are shown \& 100 \% safe. A second sentence.}
+    \label{tab:every_thing}
+    \begin{tabular}{llrrrl}
+    \toprule
+     &  & \multicolumn{2}{c}{lab\_1} & \multicolumn{2}{c}{=lab|2} \\
+    \cmidrule(lr){3-4}
+    \cmidrule(lr){5-6}
+    Sequence & Variant & PSNR $\uparrow$ & ms $\downarrow$ & Limit & A $<$word$>$ \\
+    \midrule
+    anna & =SUM(A1) & 20.12 ± 0.25 & \textbf{1.5e$-$5} & breaks at $-$1e$-$9 & @home, or `not` \\
+     & a*b\_ & \textbf{$\infty$} & 42.0 & holds & yes \\
+    \midrule
+    bob \textbackslash{}u\{202e\} & plain & n/c$^{2,1}$ & --- & --- & no \\
+     & paper & 20.10 & 1234 & --- & -x \\
+     & $-$ paper & +0.12 & $-$1 & 0.00 & - \\
+    \midrule
+    Mean & all & $-$0.50 & 7 & --- &  \\
+    \bottomrule
+    \end{tabular}
+    \\ {\footnotesize $^{1}$ n/c: no weights for `vgg`}
+    \\ {\footnotesize $^{2}$ one | two}
+    \end{table}
+    "#);
 }
 
 #[test]
 fn as_text() {
-    insta::assert_snapshot!(text(&everything()), @"");
+    insta::assert_snapshot!(text(&everything()), @r#"
+    Table #1: a|b\u{1b}[31m
+    Names such as `a|b_*c` are shown & 100 % safe.
+    A second sentence.
+
+      Variant   lab_1 PSNR ↑       lab_1 ms ↓      =lab|2 Limit  =lab|2 A <word>
+    anna
+      =SUM(A1)  20.12 ± 0.25           1.5e−5*  breaks at −1e−9  @home, or `not`
+      a*b_                 ∞*            42.0             holds  yes
+    bob \u{202e}
+      plain              n/c[2,1]           —                 —  no
+      paper            20.10             1234                 —  -x
+      − paper          +0.12               −1              0.00  -
+    Mean
+      all              −0.50                7                 —
+
+    [1] n/c: no weights for `vgg`
+    [2] one | two
+
+    Limit: where it *breaks*, by `axis|2`
+
+    A remark on `code_1` and <all>.
+    "#);
 }
 
 #[test]
@@ -138,7 +225,10 @@ fn as_rows_of_text() {
     for (id, count, about) in [("one", 1, "a"), ("three", 333, "b")] {
         list.rows.push(Row::new(id, [id], vec![Cell::count(count), Cell::text(about)]));
     }
-    insta::assert_snapshot!(skinsplat_table::text::rows(&list), @"");
+    insta::assert_snapshot!(skinsplat_table::text::rows(&list), @r#"
+    one      1  a
+    three  333  b
+    "#);
 }
 
 #[test]
@@ -146,7 +236,155 @@ fn as_json() {
     let mut table = everything();
     table.rows.truncate(3);
     table.rows.remove(1);
-    insta::assert_snapshot!(json(&table), @"");
+    insta::assert_snapshot!(json(&table), @r#"
+    {
+      "id": "every_thing",
+      "title": "Table #1: a|b\u001b[31m",
+      "sentences": [
+        "Names such as `a|b_*c` are shown & 100 % safe",
+        "A second sentence"
+      ],
+      "sample_unit": "frames",
+      "labels": [
+        {
+          "key": "sequence",
+          "title": "Sequence",
+          "once": true
+        },
+        {
+          "key": "variant",
+          "title": "Variant"
+        }
+      ],
+      "columns": [
+        {
+          "key": "psnr",
+          "group": "lab_1",
+          "title": "PSNR",
+          "better": "higher",
+          "digits": {
+            "decimals": 2
+          },
+          "align": "right"
+        },
+        {
+          "key": "time",
+          "group": "lab_1",
+          "title": "ms",
+          "better": "lower",
+          "digits": {
+            "significant": 3
+          },
+          "timing": true,
+          "align": "right"
+        },
+        {
+          "key": "limit",
+          "group": "=lab|2",
+          "title": "Limit",
+          "about": "where it *breaks*, by `axis|2`",
+          "align": "right"
+        },
+        {
+          "key": "word",
+          "group": "=lab|2",
+          "title": "A <word>",
+          "align": "left"
+        }
+      ],
+      "rows": [
+        {
+          "id": "anna/spread",
+          "kind": "measured",
+          "labels": [
+            "anna",
+            "=SUM(A1)"
+          ],
+          "cells": [
+            {
+              "content": {
+                "state": "number",
+                "value": 20.125
+              },
+              "spread": 0.25,
+              "text": "20.12 ± 0.25"
+            },
+            {
+              "content": {
+                "state": "number",
+                "value": 0.000015
+              },
+              "text": "1.5e-5",
+              "best": true
+            },
+            {
+              "content": {
+                "state": "phrase",
+                "value": -1e-9
+              },
+              "text": "breaks at -1e-9"
+            },
+            {
+              "content": {
+                "state": "text"
+              },
+              "text": "@home, or `not`"
+            }
+          ],
+          "sample": 6
+        },
+        {
+          "id": "bob/none",
+          "kind": "measured",
+          "labels": [
+            "bob\t\u202e",
+            "plain"
+          ],
+          "cells": [
+            {
+              "content": {
+                "state": "not-computed"
+              },
+              "text": "n/c",
+              "notes": [
+                1,
+                0
+              ]
+            },
+            {
+              "content": {
+                "state": "missing"
+              },
+              "text": "—",
+              "missing": 2
+            },
+            {
+              "content": {
+                "state": "not-applicable"
+              },
+              "text": "—"
+            },
+            {
+              "content": {
+                "state": "flag",
+                "value": false
+              },
+              "text": "no"
+            }
+          ],
+          "sample": 6,
+          "missing": 2
+        }
+      ],
+      "notes": [
+        "n/c: no weights\nfor `vgg`",
+        "one | two"
+      ],
+      "remarks": [
+        "A remark on `code_1` and <all>."
+      ]
+    }
+    "#);
 }
 
 #[test]
