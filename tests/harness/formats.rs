@@ -219,47 +219,67 @@ fn a_table_value_as_json() {
     {
       "id": "table7",
       "title": "Table 7",
-      "caption": "Gymnasts, matrices against quaternions",
-      "ran_on": [
+      "sentences": [
+        "Gymnasts, matrices against quaternions",
         "Ran on: Gymnasts (gymnasts)",
         "Protocol: avatar-v1, version 1",
         "Profile: standard, every frame at native resolution",
         "Frames: 12 per variant, in 2 sequences (6 each)",
         "Mean: each sequence counts once"
       ],
-      "source": "own",
+      "sample_unit": "frames",
       "labels": [
-        "Sequence",
-        "Variant"
+        {
+          "key": "sequence",
+          "title": "Sequence",
+          "once": true
+        },
+        {
+          "key": "variant",
+          "title": "Variant"
+        }
       ],
       "columns": [
         {
-          "group": null,
+          "key": "psnr",
           "title": "PSNR",
-          "metric": "psnr",
-          "decimals": 2
+          "better": "higher",
+          "digits": {
+            "decimals": 2
+          },
+          "align": "right"
         },
         {
-          "group": null,
+          "key": "ssim",
           "title": "SSIM",
-          "metric": "ssim",
-          "decimals": 3
+          "better": "higher",
+          "digits": {
+            "decimals": 3
+          },
+          "align": "right"
         },
         {
-          "group": null,
+          "key": "lpips",
           "title": "LPIPS*",
-          "metric": "lpips",
-          "decimals": 4
+          "better": "lower",
+          "digits": {
+            "decimals": 4
+          },
+          "align": "right"
         },
         {
-          "group": null,
+          "key": "splats",
           "title": "Splats",
-          "metric": "splats",
-          "decimals": 0
+          "better": "lower",
+          "digits": {
+            "decimals": 0
+          },
+          "align": "right"
         }
       ],
       "rows": [
         {
+          "id": "gymnasts/anna/anna-test/matrices",
           "kind": "measured",
           "labels": [
             "anna",
@@ -272,7 +292,6 @@ fn a_table_value_as_json() {
                 "value": 20.299999999999997
               },
               "text": "20.30",
-              "best": false,
               "missing": 2,
               "notes": [
                 0
@@ -284,7 +303,6 @@ fn a_table_value_as_json() {
                 "value": 0.9203
               },
               "text": "0.920",
-              "best": false,
               "missing": 2,
               "notes": [
                 0
@@ -296,7 +314,6 @@ fn a_table_value_as_json() {
                 "value": 0.1797
               },
               "text": "0.1797",
-              "best": false,
               "missing": 2,
               "notes": [
                 0
@@ -308,14 +325,13 @@ fn a_table_value_as_json() {
                 "value": 100.0
               },
               "text": "100",
-              "best": false,
               "missing": 2,
               "notes": [
                 0
               ]
             }
           ],
-          "frames": 4,
+          "sample": 4,
           "missing": 2
         }
       ],
@@ -327,9 +343,7 @@ fn a_table_value_as_json() {
       ],
       "remarks": [
         "A made-up table."
-      ],
-      "comparisons": [],
-      "paper": null
+      ]
     }
     "#);
 }

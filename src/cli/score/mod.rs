@@ -16,7 +16,7 @@ use skinsplat_core::scene::Image;
 use skinsplat_metrics::lpips::OneFrame;
 use skinsplat_metrics::lpips::weights::Networks;
 use skinsplat_metrics::{
-    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Summary, Truth, Wanted, all_variants,
+    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Truth, Wanted, all_variants,
 };
 use skinsplat_table::{Table, text};
 use std::collections::BTreeMap;
