@@ -7,6 +7,7 @@ use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::math::{Quaternion, Real, sh};
 use skinsplat_core::scene::{Avatar, PosedBody, RestBody};
 use skinsplat_posing::{BoundAvatar, ColourChoice, CovarianceChoice, PRESETS, PosingError, Strategy, pose};
+use skinsplat_table::Table;
 
 const SECTION: &str = "scales";
 
