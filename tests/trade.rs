@@ -13,28 +13,30 @@ use serde_json::Value;
 use skinsplat_core::scene::{Avatar, Binding, Camera, RestBody};
 use skinsplat_data::frames::load_image;
 use skinsplat_data::{Capture, FrameRef, FrameSource, Sequence, Subject, ply};
-use skinsplat_study::trade::{self, Cell, Options, SWEEPS, Stage, Trade};
+use skinsplat_study::trade::{self, Options, SWEEPS, Stage, Trade};
+use skinsplat_table::{Cell, Content};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// The cells that do not depend on a clock: section, row, column, value.
+/// The labels and cells that do not depend on a clock: section, row, column, value.
 fn lasting(result: &Value) -> Vec<[String; 4]> {
     let mut cells = Vec::new();
+    let name = |v: &Value| v.as_str().unwrap().to_owned();
     for section in result["sections"].as_array().unwrap() {
         let columns = section["columns"].as_array().unwrap();
         for row in section["rows"].as_array().unwrap() {
             let values = row["cells"].as_array().unwrap();
             assert_eq!(values.len(), columns.len(), "{row}");
             for (column, value) in columns.iter().zip(values) {
-                if column["timing"] == false {
-                    let name = |v: &Value| v.as_str().unwrap().to_owned();
-                    cells.push([
-                        name(&section["id"]),
-                        name(&row["id"]),
-                        name(&column["id"]),
-                        value.to_string(),
-                    ]);
+                if column.get("timing").is_none() {
+                    let value = format!("{} {}", value["content"], value["text"]);
+                    cells.push([name(&section["id"]), name(&row["id"]), name(&column["key"]), value]);
                 }
+            }
+            for (label, value) in
+                section["labels"].as_array().unwrap().iter().zip(row["labels"].as_array().unwrap())
+            {
+                cells.push([name(&section["id"]), name(&row["id"]), name(&label["key"]), name(value)]);
             }
         }
     }
@@ -85,7 +87,8 @@ fn a_quick_run_measures_everything_and_only_times_depend_on_the_threads() {
 
     let mut lines = desk.read("one/trade.csv").lines().map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(lines.remove(0), "section,row,column,timing,value");
-    let cells = |s: &Value| s["rows"].as_array().unwrap().len() * s["columns"].as_array().unwrap().len();
+    let count = |s: &Value, key: &str| s[key].as_array().unwrap().len();
+    let cells = |s: &Value| count(s, "rows") * (count(s, "labels") + count(s, "columns"));
     assert_eq!(lines.len(), sections.iter().map(cells).sum::<usize>());
     for picture in ["solver-test", "solver-extreme", "storage-extreme", "resolution-test"] {
         assert!(page.contains(&format!("]({picture}.svg)")), "{picture}");
@@ -102,15 +105,18 @@ fn a_quick_run_measures_everything_and_only_times_depend_on_the_threads() {
 fn check_cells(sections: &[Value]) {
     for section in sections {
         let columns = section["columns"].as_array().unwrap();
-        let place = |id: &str| columns.iter().position(|c| c["id"] == id);
+        let place = |key: &str| columns.iter().position(|c| c["key"] == key);
         let mut fronts = BTreeSet::new();
         let mut motions = BTreeSet::new();
         for row in section["rows"].as_array().unwrap() {
             let cells = row["cells"].as_array().unwrap();
             for cell in cells {
-                assert!(cell.as_str().map_or(cell.as_f64().is_some(), |word| !word.is_empty()), "{row}");
+                let content = &cell["content"];
+                let is_number = content["state"] == "number" && content["value"].is_f64();
+                assert!(is_number || content["state"] == "text", "{row}");
+                assert_ne!(cell["text"], "", "{row}");
             }
-            let of = |id: &str| place(id).and_then(|k| cells[k].as_f64());
+            let of = |key: &str| place(key).and_then(|k| cells[k]["content"]["value"].as_f64());
             if let (Some(low), Some(median), Some(high)) = (of("time_low"), of("time"), of("time_high")) {
                 assert!(0.0 < low && low <= median && median <= high, "{row}");
             }
@@ -120,15 +126,15 @@ fn check_cells(sections: &[Value]) {
                 assert!(0.0 <= median && median <= p95 && p95 <= max && max <= 180.0 + 1e-9, "{row}");
             }
             let Some(_) = place("front") else {
-                assert_eq!(cells[place("holds").unwrap()], "yes", "{row}");
+                assert_eq!(cells[place("holds").unwrap()]["text"], "yes", "{row}");
                 continue;
             };
-            let motion = cells[0].as_str().unwrap().to_owned();
-            match cells[place("front").unwrap()].as_str().unwrap() {
+            let motion = row["labels"][0].as_str().unwrap().to_owned();
+            match cells[place("front").unwrap()]["text"].as_str().unwrap() {
                 "front" => {
                     fronts.insert(motion.clone());
                 }
-                "not run" => assert_ne!(cells[place("note").unwrap()], "none", "{row}"),
+                "not run" => assert_ne!(cells[place("note").unwrap()]["text"], "none", "{row}"),
                 "beaten" | "not judged" => {}
                 other => panic!("{other}"),
             }
@@ -212,7 +218,8 @@ fn what_an_avatar_does_not_allow_is_a_row_and_the_run_goes_on() {
     let refused = row("strategy/test/face-haha");
     assert_eq!(refused.cells.last(), Some(&Cell::text("the body has no faces")));
     assert!(refused.cells.contains(&Cell::text("not run")));
-    assert!(row("strategy/test/closed-form").cells.iter().any(|cell| matches!(cell, Cell::Number(_))));
+    let measured = |cell: &Cell| matches!(cell.content, Content::Number(_));
+    assert!(row("strategy/test/closed-form").cells.iter().any(measured));
     // Opacities of this avatar differ, so that both rankings run.
     assert!(sweeps[1].rows.iter().all(|row| row.outcome.is_ok()));
     assert!(trade::measure(&stage, &["colours"], &mut |_| {}).is_err());

@@ -2,12 +2,13 @@
 
 use super::Exit;
 use super::data::Data;
-use super::output::emit;
+use super::output::{emit, table_format, written};
 use super::planning::known_experiments;
 use anyhow::Result;
 use skinsplat_fit::RECIPES;
 use skinsplat_metrics::{MetricKind, PROTOCOLS, SsimVariant, VARIANT_IDS};
 use skinsplat_posing::PRESETS;
+use skinsplat_table::{Cell, Column, Label, Row, Table, text};
 
 /// List experiments, datasets, strategies, recipes, protocols or metrics.
 #[derive(Debug, clap::Args)]
@@ -15,6 +16,9 @@ pub(super) struct List {
     /// What to list
     #[arg(value_enum)]
     what: What,
+    /// How to print it
+    #[arg(long, value_name = "FORMAT", value_parser = table_format(), default_value = "text")]
+    format: String,
     #[command(flatten)]
     data: Data,
 }
@@ -38,7 +42,7 @@ enum What {
 
 impl List {
     pub(super) fn run(&self) -> Result<Exit> {
-        let rows = match self.what {
+        let table = match self.what {
             What::Experiments => experiments()?,
             What::Datasets => self.datasets()?,
             What::Strategies => strategies(),
@@ -46,50 +50,74 @@ impl List {
             What::Protocols => protocols(),
             What::Metrics => metrics(),
         };
-        let width = rows.iter().map(|[id, _]| id.len()).max().unwrap_or_default();
-        emit(&rows.iter().map(|[id, text]| format!("{id:width$}  {text}\n")).collect::<String>())?;
+        match self.format.as_str() {
+            // Without headings: a line per thing, its id first.
+            "text" => emit(&text::rows(&table))?,
+            format => emit(&written(&table, format))?,
+        }
         Ok(Exit::Success)
     }
 
-    fn datasets(&self) -> Result<Vec<[String; 2]>> {
-        let registry = self.data.registry()?;
-        let row = |d: &crate::datasets::Dataset| {
-            let here = match (d.is_available(), &d.path) {
-                (true, _) => "available".to_owned(),
-                (false, Some(path)) => format!("not available: put it in {}", path.display()),
-                (false, None) => "not available".to_owned(),
-            };
-            [d.id.clone(), format!("{}; {}; {here}", d.title, d.licence)]
+    fn datasets(&self) -> Result<Table> {
+        let here = |d: &crate::datasets::Dataset| match (d.is_available(), &d.path) {
+            (true, _) => "available".to_owned(),
+            (false, Some(path)) => format!("not available: put it in {}", path.display()),
+            (false, None) => "not available".to_owned(),
         };
-        Ok(registry.datasets.iter().map(row).collect())
+        let registry = self.data.registry()?;
+        let rows =
+            registry.datasets.iter().map(|d| (d.id.clone(), [d.title.clone(), d.licence.clone(), here(d)]));
+        Ok(listing(
+            "Datasets",
+            [("title", "Title"), ("licence", "Licence"), ("available", "Available")],
+            rows,
+        ))
     }
 }
 
-fn experiments() -> Result<Vec<[String; 2]>> {
-    let row = |e: crate::experiment::Experiment| [e.id, format!("{} ({})", e.caption, e.protocol)];
-    Ok(known_experiments()?.into_iter().map(row).collect())
+/// A table of things by id, and texts about them.
+fn listing<const N: usize>(
+    title: &str,
+    columns: [(&str, &str); N],
+    rows: impl IntoIterator<Item = (String, [String; N])>,
+) -> Table {
+    let row = |(id, texts): (String, [String; N])| Row::new(&id, [&id], texts.map(Cell::text).into());
+    Table {
+        labels: vec![Label::new("id", "Id")],
+        columns: columns.map(|(key, title)| Column::text(key, title)).into(),
+        rows: rows.into_iter().map(row).collect(),
+        ..Table::new(title.to_lowercase(), title)
+    }
 }
 
-fn strategies() -> Vec<[String; 2]> {
-    let presets = PRESETS.iter().map(|p| [p.id.to_owned(), format!("{}: {}", p.title, p.summary)]);
+fn experiments() -> Result<Table> {
+    let rows = known_experiments()?.into_iter().map(|e| (e.id, [e.protocol, e.caption]));
+    Ok(listing("Experiments", [("protocol", "Protocol"), ("caption", "Caption")], rows))
+}
+
+fn strategies() -> Table {
+    let presets = PRESETS.iter().map(|p| (p.id.to_owned(), [p.title, p.summary]));
     let variations =
-        skinsplat_posing::variations().into_iter().map(|v| [format!("+{}", v.spec), v.summary.to_owned()]);
-    presets.chain(variations).collect()
+        skinsplat_posing::variations().into_iter().map(|v| (format!("+{}", v.spec), ["", v.summary]));
+    let rows = presets.chain(variations).map(|(id, texts)| (id, texts.map(str::to_owned)));
+    listing("Strategies", [("title", "Title"), ("summary", "Summary")], rows)
 }
 
-fn recipes() -> Vec<[String; 2]> {
-    RECIPES.iter().map(|r| [r.id.clone(), format!("{} [{}]", r.title, r.strategy)]).collect()
+fn recipes() -> Table {
+    let rows = RECIPES.iter().map(|r| (r.id.clone(), [r.title.clone(), r.strategy.to_string()]));
+    listing("Recipes", [("title", "Title"), ("strategy", "Strategy")], rows)
 }
 
-fn protocols() -> Vec<[String; 2]> {
-    PROTOCOLS.iter().map(|p| [p.id.clone(), format!("version {}; {}", p.version, p.title)]).collect()
+fn protocols() -> Table {
+    let rows = PROTOCOLS.iter().map(|p| (p.id.clone(), [p.version.to_string(), p.title.clone()]));
+    listing("Protocols", [("version", "Version"), ("title", "Title")], rows)
 }
 
-fn metrics() -> Vec<[String; 2]> {
-    let kinds = MetricKind::ALL.map(|m| [m.id().to_owned(), format!("table column {}", m.title())]);
-    let ssims = SsimVariant::ALL.map(|s| [s.id().to_owned(), "SSIM of a protocol".to_owned()]);
+fn metrics() -> Table {
+    let kinds = MetricKind::ALL.map(|m| (m.id().to_owned(), [format!("table column {}", m.title())]));
+    let ssims = SsimVariant::ALL.map(|s| (s.id().to_owned(), ["SSIM of a protocol".to_owned()]));
     let variants = VARIANT_IDS.iter().flat_map(|(region, ids)| {
-        ids.iter().map(|id| [(*id).to_owned(), format!("variant of `score`, region {}", region.id())])
+        ids.iter().map(|id| ((*id).to_owned(), [format!("variant of `score`, region {}", region.id())]))
     });
-    kinds.into_iter().chain(ssims).chain(variants).collect()
+    listing("Metrics", [("what", "What")], kinds.into_iter().chain(ssims).chain(variants))
 }

@@ -1,6 +1,8 @@
 //! Standard output: written in one place, so that a closed pipe (`| head`) ends the program quietly.
 
 use anyhow::{Context as _, Result};
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use skinsplat_table::{FORMATS, Format as TableFormat, Table, to_json};
 use std::io::Write;
 
 /// Writes text to standard output.
@@ -28,10 +30,21 @@ pub(super) enum Format {
     Json,
 }
 
+/// The formats of tables, for `--format`.
+pub(super) fn table_format() -> PossibleValuesParser {
+    let value = |format: &TableFormat| PossibleValue::new(format.id).help(format.about);
+    PossibleValuesParser::new(FORMATS.iter().map(value).collect::<Vec<_>>())
+}
+
+/// A table in one of the formats of [`table_format`].
+pub(super) fn written(table: &Table, format: &str) -> String {
+    TableFormat::named(format).map_or_else(String::new, |format| (format.write)(table))
+}
+
 /// A serialisable value as indented JSON with a final newline.
 ///
 /// # Errors
-/// If the value cannot be represented (a map with keys that are not strings).
+/// As [`emit`].
 pub(super) fn emit_json(value: &impl serde::Serialize) -> Result<()> {
-    emit(&(serde_json::to_string_pretty(value)? + "\n"))
+    emit(&to_json(value))
 }

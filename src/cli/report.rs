@@ -1,6 +1,6 @@
 //! `reproduce report`: the tables of a run again, or against a baseline.
 
-use super::output::{emit, emit_json};
+use super::output::{emit, emit_json, table_format, written};
 use super::{Context, Exit};
 use crate::report::compare::{Changes, Move, Tolerances, compare};
 use crate::report::{self, Results};
@@ -16,8 +16,8 @@ pub(super) struct Report {
     #[arg(value_name = "RUN", default_value = super::run::DEFAULT_OUT)]
     run: PathBuf,
     /// How to print the tables
-    #[arg(long, value_enum, default_value_t)]
-    format: TableFormat,
+    #[arg(long, value_name = "FORMAT", value_parser = table_format(), default_value = "markdown")]
+    format: String,
     /// Only this table
     #[arg(long, value_name = "EXPERIMENT")]
     table: Option<String>,
@@ -35,20 +35,6 @@ pub(super) struct Report {
     tolerance_lpips: f64,
 }
 
-/// A form of the tables.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-enum TableFormat {
-    /// Markdown, as in tables.md.
-    #[default]
-    Markdown,
-    /// Comma-separated values.
-    Csv,
-    /// JSON: the tables alone, without frames.
-    Json,
-    /// LaTeX.
-    Latex,
-}
-
 impl Report {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let mut results = load(&self.run)?;
@@ -63,11 +49,12 @@ impl Report {
             return self.compare(&load(baseline)?, &results, context);
         }
         let tables = results.tables.iter().map(|table| &table.table);
-        match self.format {
-            TableFormat::Markdown => emit(&report::page(&results))?,
-            TableFormat::Csv => emit(&tables.map(report::csv).collect::<Vec<_>>().join("\n"))?,
-            TableFormat::Latex => emit(&tables.map(report::latex).collect::<Vec<_>>().join("\n"))?,
-            TableFormat::Json => emit_json(&tables.collect::<Vec<_>>())?,
+        match self.format.as_str() {
+            // With what is said around the tables, as in tables.md.
+            "markdown" => emit(&report::page(&results))?,
+            // One document.
+            "json" => emit_json(&tables.collect::<Vec<_>>())?,
+            format => emit(&tables.map(|table| written(table, format)).collect::<Vec<_>>().join("\n"))?,
         }
         Ok(if results.missing() > 0 { Exit::Incomplete } else { Exit::Success })
     }
@@ -80,8 +67,8 @@ impl Report {
             ..Tolerances::default()
         };
         let changes = compare(baseline, candidate, &tolerances);
-        match self.format {
-            TableFormat::Json => emit_json(&changes)?,
+        match self.format.as_str() {
+            "json" => emit_json(&changes)?,
             _ => emit(&text(&changes))?,
         }
         context.note(format!("{} sequences and variants compared", changes.compared));

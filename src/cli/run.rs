@@ -11,6 +11,7 @@ use crate::run::store::{self, FILE_NAME, Store};
 use crate::run::{self, Error};
 use anyhow::{Context as _, Result};
 use skinsplat_data::atomic;
+use skinsplat_table::Format;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -159,13 +160,18 @@ pub(super) fn stores(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
+/// Formats that each table is written in, in a file of its own.
+const TABLE_FILES: [&str; 2] = ["csv", "latex"];
+
 /// Every form of the tables.
 pub(super) fn write_results(folder: &Path, results: &report::Results) -> Result<()> {
     write_text(&folder.join("tables.md"), &report::page(results))?;
     write_text(&folder.join("results.json"), &results.to_json())?;
     for table in &results.tables {
-        write_text(&folder.join(format!("{}.csv", table.experiment)), &report::csv(&table.table))?;
-        write_text(&folder.join(format!("{}.tex", table.experiment)), &report::latex(&table.table))?;
+        for format in TABLE_FILES.iter().filter_map(|id| Format::named(id)) {
+            let file = format!("{}.{}", table.experiment, format.extension);
+            write_text(&folder.join(file), &(format.write)(&table.table))?;
+        }
     }
     Ok(())
 }

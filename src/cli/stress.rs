@@ -61,8 +61,8 @@ impl Stress {
             frames::save_png(&out.join(&picture.file), &picture.image)?;
         }
         let markdown = report.markdown();
-        write(&out.join("stress.csv"), &report.csv()?)?;
-        write(&out.join("stress.json"), &report.json()?)?;
+        write(&out.join("stress.csv"), &report.csv())?;
+        write(&out.join("stress.json"), &report.json())?;
         write(&out.join("stress.md"), &markdown)?;
         if !context.quiet {
             emit(&markdown)?;

@@ -1,17 +1,21 @@
-//! Results to a [`Table`].
+//! Results to a [`Table`] and comparisons.
 
 use super::captions::{caption, count, ran_on};
-use super::layout::{Entry, mark_best_per_sequence, shape};
-use super::paper::{beside, printed_table};
+use super::comparison::{Comparison, MetricDifference};
+use super::layout::{Entry, digits, mark_best_per_sequence, shape};
+use super::paper::beside;
 use super::replicates::{Group, groups, spread};
 use super::results::{FrameResult, SequenceResults, VariantResults};
 use super::stats::paired;
-use super::table::{Cell, Comparison, Content, MetricDifference, RowKind, Table};
 use crate::experiment::{Column, Experiment, Options, PlannedTable, Source};
 use skinsplat_metrics::MetricKind;
+use skinsplat_table::{Cell, Content, RowKind, Table};
 
 /// Failed or missing frames that a footnote names; the others are counted.
 const NAMED_FRAMES: usize = 3;
+
+/// What rows are means over.
+pub(super) const SAMPLE_UNIT: &str = "frames";
 
 /// Footnotes in order of first use.
 #[derive(Default)]
@@ -66,18 +70,17 @@ pub(super) fn table(
     mark_best_per_sequence(&mut entries, &experiment.columns);
     let shape = shape(experiment.layout, &experiment.columns, entries);
     Table {
-        id: experiment.id.clone(),
-        title: experiment.title.clone(),
-        caption: caption(experiment, planned.source),
-        ran_on: ran_on(experiment, planned, options, sequences),
-        source: planned.source,
+        sentences: [caption(experiment, planned.source)]
+            .into_iter()
+            .chain(ran_on(experiment, planned, options, sequences))
+            .collect(),
+        sample_unit: Some(SAMPLE_UNIT.to_owned()),
         labels: shape.labels,
         columns: shape.columns,
         rows: shape.rows,
         notes: notes.into_vec(),
         remarks: if planned.source == Source::Absent { Vec::new() } else { experiment.notes.clone() },
-        comparisons: comparisons(experiment, sequences, &groups),
-        paper: experiment.paper.as_ref().map(|paper| Box::new(printed_table(experiment, paper))),
+        ..Table::new(&experiment.id, &experiment.title)
     }
 }
 
@@ -103,6 +106,7 @@ fn measured(experiment: &Experiment, sequence: &SequenceResults, group: &Group, 
         cell
     };
     Entry {
+        id: format!("{}/{}", sequence.id, sequence.variants[group.members[0]].id),
         sequence: sequence.label.clone(),
         variant: group.label.clone(),
         kind: RowKind::Measured,
@@ -116,7 +120,7 @@ fn measured(experiment: &Experiment, sequence: &SequenceResults, group: &Group, 
 fn over_seeds(contents: &[Content], column: &Column) -> Cell {
     let values: Vec<f64> = contents.iter().filter_map(|content| content.value()).collect();
     let spread = if values.len() == contents.len() { spread(&values) } else { None };
-    Cell::with_spread(mean_content(contents), spread, column.decimals())
+    Cell::with_spread(mean_content(contents), spread, digits(column))
 }
 
 fn content(variant: &VariantResults, metric: MetricKind) -> Content {
@@ -181,6 +185,7 @@ fn mean(
         cell
     };
     Entry {
+        id: format!("mean/{}", sequences[0].variants[group.members[0]].id),
         sequence: label.to_owned(),
         variant: group.label.clone(),
         kind: RowKind::Mean,
@@ -202,8 +207,9 @@ fn mean_content(contents: &[Content]) -> Content {
 }
 
 /// Every variant against the baseline, on each sequence and on all of them.
-fn comparisons(experiment: &Experiment, sequences: &[SequenceResults], groups: &[Group]) -> Vec<Comparison> {
+pub(super) fn comparisons(experiment: &Experiment, sequences: &[SequenceResults]) -> Vec<Comparison> {
     let Some(first) = sequences.first() else { return Vec::new() };
+    let groups = groups(experiment, &first.variants);
     let Some(b) = first.variants.iter().position(|v| v.id == experiment.baseline) else { return Vec::new() };
     let Some(baseline) = groups.iter().find(|group| group.members.contains(&b)) else { return Vec::new() };
     let others: Vec<&Group> = groups.iter().filter(|group| !group.members.contains(&b)).collect();

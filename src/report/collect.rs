@@ -1,7 +1,7 @@
 //! Records to results: what each planned frame became, and the protocol's aggregate of each sequence.
 
 use super::results::{FrameResult, Results, SCHEMA, SequenceResults, TableResults, VariantResults};
-use super::{Error, build};
+use super::{Error, build, paper};
 use crate::experiment::{
     CodeVersions, DataRow, Experiment, Job, Outcome, Plan, PlannedTable, Records, Variant,
 };
@@ -50,7 +50,10 @@ fn table(
         version: experiment.version,
         protocol: planned.protocol.clone(),
         datasets: planned.datasets.clone(),
+        source: planned.source,
         table: build::table(experiment, planned, &plan.options, &sequences),
+        comparisons: build::comparisons(experiment, &sequences),
+        paper: experiment.paper.as_ref().map(|paper| paper::printed_table(experiment, paper)),
         sequences,
     })
 }

@@ -1,11 +1,13 @@
 //! The shapes of the paper's tables: a row per sequence and variant, or a row per variant with a group of columns per
 //! sequence.
 
-use super::table::{Cell, Row, RowKind, TableColumn, mark_best};
-use crate::experiment::{Column, Layout};
+use crate::experiment::{self, Layout};
+use skinsplat_table::{Cell, Column, Digits, Direction, Label, Row, RowKind, mark_best};
 
 /// The numbers of one sequence (or of the mean) and one variant.
 pub(super) struct Entry {
+    /// Unique in the table: `dataset/subject/sequence/variant`, with the kind unless it is measured.
+    pub(super) id: String,
     /// The sequence, or the title of the mean.
     pub(super) sequence: String,
     /// The variant.
@@ -22,13 +24,13 @@ pub(super) struct Entry {
 
 /// Headings, columns and rows.
 pub(super) struct Shape {
-    pub(super) labels: Vec<String>,
-    pub(super) columns: Vec<TableColumn>,
+    pub(super) labels: Vec<Label>,
+    pub(super) columns: Vec<Column>,
     pub(super) rows: Vec<Row>,
 }
 
 /// Marks the best measured value of each sequence (and of the mean) in every column.
-pub(super) fn mark_best_per_sequence(entries: &mut [Entry], columns: &[Column]) {
+pub(super) fn mark_best_per_sequence(entries: &mut [Entry], columns: &[experiment::Column]) {
     let measured = |entry: &Entry| matches!(entry.kind, RowKind::Measured | RowKind::Mean);
     let mut groups: Vec<(RowKind, String)> = Vec::new();
     for entry in entries.iter().filter(|entry| measured(entry)) {
@@ -37,50 +39,54 @@ pub(super) fn mark_best_per_sequence(entries: &mut [Entry], columns: &[Column]) 
             groups.push(group);
         }
     }
+    let directions: Vec<Option<Direction>> = columns.iter().map(|column| Some(direction(column))).collect();
     for (kind, sequence) in groups {
         let mut rows: Vec<&mut Vec<Cell>> = entries
             .iter_mut()
             .filter(|entry| entry.kind == kind && entry.sequence == sequence)
             .map(|entry| &mut entry.cells)
             .collect();
-        mark_best(&mut rows, columns.iter().map(|column| column.metric));
+        mark_best(&mut rows, &directions);
     }
 }
 
 /// Brings entries into shape.
-pub(super) fn shape(layout: Layout, columns: &[Column], entries: Vec<Entry>) -> Shape {
+pub(super) fn shape(layout: Layout, columns: &[experiment::Column], entries: Vec<Entry>) -> Shape {
     match layout {
         Layout::Rows => rows(columns, entries),
         Layout::Wide => wide(columns, entries),
     }
 }
 
-fn column(column: &Column, group: Option<&str>) -> TableColumn {
-    TableColumn {
-        group: group.map(str::to_owned),
-        title: column.title().to_owned(),
-        metric: column.metric,
-        decimals: column.decimals(),
-    }
+fn direction(column: &experiment::Column) -> Direction {
+    Direction::higher_if(column.metric.higher_is_better())
 }
 
-fn rows(columns: &[Column], entries: Vec<Entry>) -> Shape {
+fn column(column: &experiment::Column) -> Column {
+    Column::new(column.metric.id(), column.title()).digits(digits(column)).better(direction(column))
+}
+
+/// With how many digits a column is printed.
+pub(super) fn digits(column: &experiment::Column) -> Digits {
+    Digits::Decimals(column.decimals())
+}
+
+fn rows(columns: &[experiment::Column], entries: Vec<Entry>) -> Shape {
     let row = |entry: Entry| Row {
         kind: entry.kind,
-        labels: vec![entry.sequence, entry.variant],
-        cells: entry.cells,
-        frames: entry.frames,
+        sample: entry.frames,
         missing: entry.missing,
+        ..Row::new(entry.id, [entry.sequence, entry.variant], entry.cells)
     };
     Shape {
-        labels: vec!["Sequence".into(), "Variant".into()],
-        columns: columns.iter().map(|c| column(c, None)).collect(),
+        labels: vec![Label::new("sequence", "Sequence").once(), Label::new("variant", "Variant")],
+        columns: columns.iter().map(column).collect(),
         rows: entries.into_iter().map(row).collect(),
     }
 }
 
 /// The mean is one more group of columns; the frames of a row are those of its sequences.
-fn wide(columns: &[Column], entries: Vec<Entry>) -> Shape {
+fn wide(columns: &[experiment::Column], entries: Vec<Entry>) -> Shape {
     let mut groups: Vec<String> = Vec::new();
     let mut lines: Vec<(RowKind, String)> = Vec::new();
     let line = |entry: &Entry| match entry.kind {
@@ -104,15 +110,14 @@ fn wide(columns: &[Column], entries: Vec<Entry>) -> Shape {
         });
         Row {
             kind,
-            labels: vec![variant.clone()],
-            cells: cells.collect(),
-            frames: sequences().map(|entry| entry.frames).sum(),
+            sample: sequences().map(|entry| entry.frames).sum(),
             missing: sequences().map(|entry| entry.missing).sum(),
+            ..Row::new(format!("{}/{variant}", kind.id()), [variant.clone()], cells.collect())
         }
     };
     Shape {
-        labels: vec!["Method".into()],
-        columns: groups.iter().flat_map(|group| columns.iter().map(|c| column(c, Some(group)))).collect(),
+        labels: vec![Label::new("method", "Method")],
+        columns: groups.iter().flat_map(|group| columns.iter().map(|c| column(c).group(group))).collect(),
         rows: lines.into_iter().map(row).collect(),
     }
 }

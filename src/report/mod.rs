@@ -3,20 +3,19 @@
 //! ```text
 //! Plan + Records ─ results() ─► Results ─┬─ to_json()            results.json
 //!                                        ├─ page()               tables.md
-//!                                        ├─ Table ─ markdown, csv, json, latex
+//!                                        ├─ Table                one of each format of `skinsplat_table`
 //!                                        └─ compare(baseline)    verdict, frames that moved
 //! ```
 //!
-//! A [`Table`] is the one value that every format prints. Missing frames are counted and named, a metric that was not
+//! A [`Table`](skinsplat_table::Table) is the one value that every format prints. Missing frames are counted and named, a metric that was not
 //! computed is "n/c" and never 0, and the best value of a sequence is judged on the printed digits.
 
 mod build;
 mod captions;
 mod collect;
 pub mod compare;
-mod csv;
+mod comparison;
 mod curves;
-mod latex;
 mod layout;
 mod markdown;
 mod page;
@@ -24,16 +23,13 @@ mod paper;
 mod replicates;
 mod results;
 pub mod stats;
-mod table;
 
 pub use collect::results;
-pub use csv::csv;
+pub use comparison::{Comparison, MetricDifference};
 pub use curves::{curve_plots, curves_csv};
-pub use latex::latex;
 pub use markdown::markdown;
 pub use page::page;
 pub use results::{FrameResult, Results, SCHEMA, SequenceResults, TableResults, VariantResults};
-pub use table::{Cell, Comparison, Content, MetricDifference, Row, RowKind, Table, TableColumn};
 
 use skinsplat_metrics::MetricsError;
 

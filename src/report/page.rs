@@ -26,7 +26,7 @@ pub fn page(results: &Results) -> String {
     }
     for table in &results.tables {
         text.push('\n');
-        text += &markdown(&table.table);
+        text += &markdown(table);
     }
     text
 }

@@ -1,9 +1,9 @@
 //! The paper's numbers: beside ours where they compare, as a table of their own otherwise.
 
-use super::build::Notes;
-use super::layout::{Entry, shape};
-use super::table::{Cell, Content, RowKind, Table};
+use super::build::{Notes, SAMPLE_UNIT};
+use super::layout::{Entry, digits, shape};
 use crate::experiment::{Experiment, Paper, PaperRow, Printed, Source};
+use skinsplat_table::{Cell, Content, Digits, RowKind, Table};
 
 /// The printed numbers that belong beside an entry, and the differences to them: on the table's own data only, and only
 /// for a variant that the paper has.
@@ -27,11 +27,12 @@ pub(super) fn beside(
     let differences =
         ours.cells.iter().zip(&printed.cells).zip(&experiment.columns).map(|((a, b), column)| {
             match (a.content, b.content) {
-                (Content::Number(a), Content::Number(b)) => Cell::difference(a - b, column.decimals()),
+                (Content::Number(a), Content::Number(b)) => Cell::difference(a - b, digits(column)),
                 _ => Cell::empty(),
             }
         });
     let differences = Entry {
+        id: format!("{}/difference", ours.id),
         sequence: ours.sequence.clone(),
         variant: format!("{} − paper", ours.variant),
         kind: RowKind::Difference,
@@ -39,7 +40,8 @@ pub(super) fn beside(
         frames: ours.frames,
         missing: ours.missing,
     };
-    vec![Entry { variant: format!("{}, paper", ours.variant), ..printed }, differences]
+    let id = format!("{}/paper", ours.id);
+    vec![Entry { id, variant: format!("{}, paper", ours.variant), ..printed }, differences]
 }
 
 /// The table as the paper prints it.
@@ -55,18 +57,17 @@ pub(super) fn printed_table(experiment: &Experiment, paper: &Paper) -> Table {
     });
     let shape = shape(experiment.layout, &experiment.columns, entries.collect());
     Table {
-        id: format!("{}-paper", experiment.id),
-        title: format!("{} of {}, as printed", experiment.title, paper.source),
-        caption: paper.caption.clone(),
-        ran_on: vec!["The paper's values, on its data and avatars".to_owned()],
-        source: Source::Own,
+        sentences: vec![paper.caption.clone(), "The paper's values, on its data and avatars".to_owned()],
+        sample_unit: Some(SAMPLE_UNIT.to_owned()),
         labels: shape.labels,
         columns: shape.columns,
         rows: shape.rows,
         notes: notes.into_vec(),
         remarks: paper.note.iter().cloned().collect(),
-        comparisons: Vec::new(),
-        paper: None,
+        ..Table::new(
+            format!("{}-paper", experiment.id),
+            format!("{} of {}, as printed", experiment.title, paper.source),
+        )
     }
 }
 
@@ -77,7 +78,7 @@ fn entry(experiment: &Experiment, row: &PaperRow, sequence: &str, variant: &str,
         text: printed.to_string(),
         best,
         notes: doubt.filter(|_| doubtful).into_iter().collect(),
-        ..Cell::new(Content::Number(printed.value()), printed.decimals())
+        ..Cell::number(printed.value(), Digits::Decimals(printed.decimals()))
     };
     let cells = experiment.columns.iter().map(|column| {
         let doubtful = row.doubt.as_ref().is_some_and(|doubt| doubt.starts_with(column.metric.id()));
@@ -85,6 +86,7 @@ fn entry(experiment: &Experiment, row: &PaperRow, sequence: &str, variant: &str,
         printed.map_or_else(Cell::empty, |p| cell(p, row.bold.contains(&column.metric), doubtful))
     });
     Entry {
+        id: format!("{sequence}/{variant}"),
         sequence: sequence.to_owned(),
         variant: variant.to_owned(),
         kind: RowKind::Paper,

@@ -1,13 +1,14 @@
 //! The results document, `results.json`: every table, sequence and frame of a run. Nothing in it depends on the time or
 //! the machine. `reports/SCHEMA.md` describes it key by key.
 
-use super::table::Table;
-use crate::experiment::{AvatarRecipe, CodeVersions, Options};
+use super::comparison::Comparison;
+use crate::experiment::{AvatarRecipe, CodeVersions, Options, Source};
 use serde::{Deserialize, Serialize};
 use skinsplat_metrics::{FrameScore, MetricKind, ProtocolId, Summary};
+use skinsplat_table::{Digits, Table, to_json};
 
 /// Version of the document's format.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// Everything that a run found out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,8 +29,7 @@ pub struct Results {
 impl Results {
     /// The document as text: JSON, indented, with a final newline.
     pub fn to_json(&self) -> String {
-        serde_json::to_string_pretty(self).expect("keys are strings and infinities have their own form")
-            + "\n"
+        to_json(self)
     }
 
     /// Reads a document.
@@ -47,7 +47,7 @@ impl Results {
             return Err(format!("schema: {}; expected {SCHEMA}, which this program reads", versioned.schema));
         }
         let results: Self = serde_json::from_str(text).map_err(|error| error.to_string())?;
-        results.tables.iter().try_for_each(|table| table.table.check())?;
+        results.tables.iter().try_for_each(TableResults::check)?;
         Ok(results)
     }
 
@@ -70,10 +70,32 @@ pub struct TableResults {
     pub protocol: ProtocolId,
     /// The data sets that took part: id and title.
     pub datasets: Vec<(String, String)>,
-    /// The table.
+    /// Own data, a stand-in, or nothing.
+    pub source: Source,
+    /// The table as it is printed.
     pub table: Table,
+    /// Variants compared frame by frame, per sequence and over all of them.
+    pub comparisons: Vec<Comparison>,
+    /// The paper's own table.
+    pub paper: Option<Table>,
     /// The sequences, each with every variant and frame.
     pub sequences: Vec<SequenceResults>,
+}
+
+impl TableResults {
+    /// Checks what formats rely on.
+    fn check(&self) -> Result<(), String> {
+        let digits = self.comparisons.iter().flat_map(|c| &c.differences).map(|d| d.decimals);
+        if let Some(n) = digits.into_iter().find(|&n| n > Digits::MOST) {
+            let most = Digits::MOST;
+            return Err(format!(
+                "table `{}`: comparisons: decimals: {n}; expected at most {most}",
+                self.experiment
+            ));
+        }
+        self.table.check()?;
+        self.paper.as_ref().map_or(Ok(()), Table::check)
+    }
 }
 
 /// A sequence.

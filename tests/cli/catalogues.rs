@@ -96,6 +96,17 @@ fn list_names_everything_that_can_be_chosen() {
     for variation in ["+rotation=lifted-sum ", "+rotation=power-N[-START] ", "+colour=view-rotation "] {
         assert!(strategies.lines().any(|line| line.starts_with(variation)), "{variation}: {strategies}");
     }
+    // The same table in every format.
+    for (format, line) in [
+        ("markdown", "| psnr | table column PSNR |"),
+        ("csv", "psnr,table column PSNR"),
+        ("latex", "psnr & table column PSNR \\\\"),
+    ] {
+        let listed = desk.ok(args!["list", "metrics", "--format", format]);
+        assert!(listed.lines().any(|l| l == line), "{listed}");
+    }
+    let listed: Value = serde_json::from_str(&desk.ok(args!["list", "metrics", "--format", "json"])).unwrap();
+    assert_eq!((&listed["rows"][0]["id"], &listed["columns"][0]["key"]), (&"psnr".into(), &"what".into()));
     // What is listed as a strategy can be asked for by that spec.
     for preset in skinsplat_posing::PRESETS {
         assert!(preset.strategy.to_string().parse::<skinsplat_posing::Strategy>().is_ok(), "{}", preset.id);

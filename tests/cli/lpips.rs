@@ -142,7 +142,9 @@ fn every_protocol_at_once_is_each_by_itself() {
         assert_eq!(row["lpips_not_computed"].is_string(), vgg, "{row}");
     }
     let text = desk.ok(args!["score", "renders", "truths", "--protocol", "all"]);
-    assert!(text.contains("| 3dgs@1"), "{text}");
+    assert!(text.lines().any(|line| line.starts_with("3dgs@1  ")), "{text}");
+    let markdown = desk.ok(args!["score", "renders", "truths", "--protocol", "all", "--format", "markdown"]);
+    assert!(markdown.contains("| 3dgs@1 | "), "{markdown}");
     assert!(
         text.contains("3dgs: not computed: lpips: no weights for vgg; expected --lpips-weights FILE"),
         "{text}"

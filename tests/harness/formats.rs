@@ -1,10 +1,11 @@
 //! One table value in every format.
 
 use super::made_up::{run, table, table_7, wide_table_7, with_holes};
-use skinsplat::report::{self, Table};
+use skinsplat::report::{self, TableResults};
+use skinsplat_table::{csv, json, latex};
 
 /// The table without what has tables of its own.
-fn own_only(mut table: Table) -> Table {
+fn own_only(mut table: TableResults) -> TableResults {
     table.paper = None;
     table.comparisons.clear();
     table
@@ -63,7 +64,7 @@ fn a_table_of_rows() {
 
     </details>
     "#);
-    insta::assert_snapshot!(report::csv(&table(&table_7(), run)), @r#"
+    insta::assert_snapshot!(csv(&table(&table_7(), run).table), @r#"
     sequence,variant,kind,frames,missing,psnr,ssim,lpips,splats,notes
     anna,Matrices,measured,6,0,20.25,0.9202499999999999,0.17975,100,
     anna,"Matrices, paper",paper,0,0,20.10,0.920,0.1800,90,
@@ -76,7 +77,7 @@ fn a_table_of_rows() {
     Mean,Matrices,mean,12,0,20.75,0.92075,0.17925,100,
     Mean,Quaternions,mean,12,0,21.25,0.92125,0.17875000000000002,100,
     "#);
-    insta::assert_snapshot!(report::latex(&table(&table_7(), run)), @r#"
+    insta::assert_snapshot!(latex(&table(&table_7(), run).table), @r#"
     \begin{table}
     \centering
     \caption{Gymnasts, matrices against quaternions. Ran on: Gymnasts (gymnasts). Protocol: avatar-v1, version 1. Profile: standard, every frame at native resolution. Frames: 12 per variant, in 2 sequences (6 each). Mean: each sequence counts once.}
@@ -128,14 +129,14 @@ fn a_wide_table() {
 
     A made-up table.
     "#);
-    insta::assert_snapshot!(report::csv(&table), @r#"
+    insta::assert_snapshot!(csv(&table.table), @r#"
     method,kind,frames,missing,anna psnr,anna ssim,anna lpips,anna splats,bob psnr,bob ssim,bob lpips,bob splats,All psnr,All ssim,All lpips,All splats,notes
     Matrices,measured,12,0,20.25,0.9202499999999999,0.17975,100,21.25,0.92125,0.17875,100,20.75,0.92075,0.17925,100,
     "Matrices, paper",paper,0,0,20.10,0.920,0.1800,90,21.00,0.820,0.1600,90,,,,,"bob, Matrices: ssim 0.820 looks like a slip"
     Matrices − paper,difference,12,0,0.14999999999999858,0.00024999999999986144,-0.0002500000000000002,10,0.25,0.10125000000000006,0.01874999999999999,10,,,,,
     Quaternions,measured,12,0,20.75,0.9207500000000001,0.17925000000000002,100,21.75,0.92175,0.17825000000000002,100,21.25,0.92125,0.17875000000000002,100,
     "#);
-    insta::assert_snapshot!(report::latex(&table), @r#"
+    insta::assert_snapshot!(latex(&table.table), @r#"
     \begin{table}
     \centering
     \caption{Gymnasts, matrices against quaternions. Ran on: Gymnasts (gymnasts). Protocol: avatar-v1, version 1. Profile: standard, every frame at native resolution. Frames: 12 per variant, in 2 sequences (6 each). All: each sequence counts once.}
@@ -195,7 +196,7 @@ fn holes_are_shown_not_averaged_away() {
 
     A made-up table.
     "#);
-    insta::assert_snapshot!(report::csv(&table), @r#"
+    insta::assert_snapshot!(csv(&table.table), @r#"
     sequence,variant,kind,frames,missing,psnr,ssim,lpips,splats,notes
     anna,Matrices,measured,4,2,20.299999999999997,0.9203,0.1797,100,"anna, Matrices: 2 of 6 frames missing: image_0001 (failed: truth: image_0001.png is truncated), image_0002 (not run)"
     anna,"Matrices, paper",paper,0,0,20.10,0.920,0.1800,90,
@@ -213,52 +214,72 @@ fn holes_are_shown_not_averaged_away() {
 #[test]
 fn a_table_value_as_json() {
     let mut table = own_only(table(&table_7(), with_holes));
-    table.rows.truncate(1);
-    insta::assert_snapshot!(table.to_json(), @r#"
+    table.table.rows.truncate(1);
+    insta::assert_snapshot!(json(&table.table), @r#"
     {
       "id": "table7",
       "title": "Table 7",
-      "caption": "Gymnasts, matrices against quaternions",
-      "ran_on": [
+      "sentences": [
+        "Gymnasts, matrices against quaternions",
         "Ran on: Gymnasts (gymnasts)",
         "Protocol: avatar-v1, version 1",
         "Profile: standard, every frame at native resolution",
         "Frames: 12 per variant, in 2 sequences (6 each)",
         "Mean: each sequence counts once"
       ],
-      "source": "own",
+      "sample_unit": "frames",
       "labels": [
-        "Sequence",
-        "Variant"
+        {
+          "key": "sequence",
+          "title": "Sequence",
+          "once": true
+        },
+        {
+          "key": "variant",
+          "title": "Variant"
+        }
       ],
       "columns": [
         {
-          "group": null,
+          "key": "psnr",
           "title": "PSNR",
-          "metric": "psnr",
-          "decimals": 2
+          "better": "higher",
+          "digits": {
+            "decimals": 2
+          },
+          "align": "right"
         },
         {
-          "group": null,
+          "key": "ssim",
           "title": "SSIM",
-          "metric": "ssim",
-          "decimals": 3
+          "better": "higher",
+          "digits": {
+            "decimals": 3
+          },
+          "align": "right"
         },
         {
-          "group": null,
+          "key": "lpips",
           "title": "LPIPS*",
-          "metric": "lpips",
-          "decimals": 4
+          "better": "lower",
+          "digits": {
+            "decimals": 4
+          },
+          "align": "right"
         },
         {
-          "group": null,
+          "key": "splats",
           "title": "Splats",
-          "metric": "splats",
-          "decimals": 0
+          "better": "lower",
+          "digits": {
+            "decimals": 0
+          },
+          "align": "right"
         }
       ],
       "rows": [
         {
+          "id": "gymnasts/anna/anna-test/matrices",
           "kind": "measured",
           "labels": [
             "anna",
@@ -271,7 +292,6 @@ fn a_table_value_as_json() {
                 "value": 20.299999999999997
               },
               "text": "20.30",
-              "best": false,
               "missing": 2,
               "notes": [
                 0
@@ -283,7 +303,6 @@ fn a_table_value_as_json() {
                 "value": 0.9203
               },
               "text": "0.920",
-              "best": false,
               "missing": 2,
               "notes": [
                 0
@@ -295,7 +314,6 @@ fn a_table_value_as_json() {
                 "value": 0.1797
               },
               "text": "0.1797",
-              "best": false,
               "missing": 2,
               "notes": [
                 0
@@ -307,14 +325,13 @@ fn a_table_value_as_json() {
                 "value": 100.0
               },
               "text": "100",
-              "best": false,
               "missing": 2,
               "notes": [
                 0
               ]
             }
           ],
-          "frames": 4,
+          "sample": 4,
           "missing": 2
         }
       ],
@@ -326,9 +343,7 @@ fn a_table_value_as_json() {
       ],
       "remarks": [
         "A made-up table."
-      ],
-      "comparisons": [],
-      "paper": null
+      ]
     }
     "#);
 }
@@ -336,11 +351,11 @@ fn a_table_value_as_json() {
 #[test]
 fn csv_reads_back_in_full_precision() {
     for experiment in [table_7(), wide_table_7()] {
-        let table = table(&experiment, with_holes);
-        let text = report::csv(&table);
-        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let table = table(&experiment, with_holes).table;
+        let text = csv(&table);
+        let mut reader = ::csv::Reader::from_reader(text.as_bytes());
         let header = reader.headers().unwrap().clone();
-        let records: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+        let records: Vec<::csv::StringRecord> = reader.records().map(Result::unwrap).collect();
         assert_eq!(records.len(), table.rows.len());
         for (record, row) in records.iter().zip(&table.rows) {
             let labels: Vec<&str> = record.iter().take(row.labels.len()).collect();

@@ -4,7 +4,7 @@ use skinsplat::experiment::{
     AvatarFile, Dataset, Experiment, FrameInfo, FrameRecord, Options, Outcome, Plan, Profile, Records, Role,
     Seconds, SequenceInfo, SubjectInfo, Subset, plan,
 };
-use skinsplat::report::{self, Results, Table};
+use skinsplat::report::{self, Results, TableResults};
 use skinsplat_data::Capture;
 use skinsplat_metrics::{FrameScore, Protocol};
 
@@ -118,8 +118,8 @@ pub(super) fn results(experiment: &Experiment, records: impl Fn(&Plan) -> Record
 }
 
 /// The table of an experiment on its own data.
-pub(super) fn table(experiment: &Experiment, records: impl Fn(&Plan) -> Records) -> Table {
-    results(experiment, records).tables.remove(0).table
+pub(super) fn table(experiment: &Experiment, records: impl Fn(&Plan) -> Records) -> TableResults {
+    results(experiment, records).tables.remove(0)
 }
 
 /// The made-up scores with a hole: of anna's frames, one failed and one was not run; bob's matrices have no LPIPS and

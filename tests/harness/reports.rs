@@ -5,8 +5,9 @@ use super::made_up::{
 };
 use skinsplat::experiment::{Experiment, Outcome, Records, Source, plan};
 use skinsplat::report::compare::{Tolerances, Verdict, compare};
-use skinsplat::report::{self, Content, Results, RowKind, Table};
+use skinsplat::report::{self, Results, TableResults};
 use skinsplat_metrics::MetricKind;
+use skinsplat_table::{Content, Row, RowKind, csv, markdown};
 
 #[test]
 fn a_sequence_without_any_score_leaves_no_mean() {
@@ -16,7 +17,8 @@ fn a_sequence_without_any_score_leaves_no_mean() {
             records.remove(&job.variants[1].key);
         }
         records
-    });
+    })
+    .table;
     let row = |kind, variant: &str| {
         table.rows.iter().find(|row| row.kind == kind && row.labels[1] == variant).unwrap().clone()
     };
@@ -24,7 +26,7 @@ fn a_sequence_without_any_score_leaves_no_mean() {
     let mean = row(RowKind::Mean, "Quaternions");
     assert!(mean.cells.iter().all(|cell| cell.content == Content::Missing && cell.text == "—"));
     assert_eq!(table.notes[mean.cells[0].notes[0]], "Mean, Quaternions: no mean, anna has no value");
-    assert_eq!((mean.frames, mean.missing), (6, 6));
+    assert_eq!((mean.sample, mean.missing), (6, 6));
     assert!(!row(RowKind::Measured, "Matrices").cells[0].best, "nothing to compare with");
 }
 
@@ -34,8 +36,8 @@ fn every_cell_of_the_paper_s_tables_is_printed_with_its_digits_and_bold() {
     let plan = plan(&experiments, &[figures()], &options()).unwrap();
     let results = report::results(&plan, &experiments, &run(&plan)).unwrap();
     for (experiment, results) in experiments.iter().zip(&results.tables) {
-        let printed = results.table.paper.as_deref().unwrap();
-        let markdown = report::markdown(printed);
+        let printed = results.paper.as_ref().unwrap();
+        let markdown = markdown(printed);
         let cells: Vec<_> = printed.rows.iter().flat_map(|row| &row.cells).collect();
         let paper = experiment.paper.as_ref().unwrap();
         let numbers =
@@ -53,7 +55,7 @@ fn every_cell_of_the_paper_s_tables_is_printed_with_its_digits_and_bold() {
             }
         }
     }
-    let wide = results.tables[5].table.paper.as_deref().unwrap();
+    let wide = results.tables[5].paper.as_ref().unwrap();
     assert_eq!(
         wide.rows.iter().map(|row| row.labels[0].as_str()).collect::<Vec<_>>(),
         ["HAHA", "Pure skinned baseline"]
@@ -61,7 +63,7 @@ fn every_cell_of_the_paper_s_tables_is_printed_with_its_digits_and_bold() {
     let groups: Vec<&str> = wide.columns.iter().step_by(3).map(|c| c.group.as_deref().unwrap()).collect();
     assert_eq!(groups, ["00016", "00019", "00018", "00027", "All"]);
     assert_eq!(wide.rows[0].cells[12].text, "27.70");
-    assert!(results.tables[2].table.paper.as_ref().unwrap().notes[0].contains("0.9712 is the likely value"));
+    assert!(results.tables[2].paper.as_ref().unwrap().notes[0].contains("0.9712 is the likely value"));
 }
 
 #[test]
@@ -80,7 +82,7 @@ fn results_do_not_depend_on_the_order_of_frames_or_on_time() {
 }
 
 /// How a table is damaged, and the complaint.
-type Damage = (fn(&mut Table), &'static str);
+type Damage = (fn(&mut TableResults), &'static str);
 
 #[test]
 fn results_read_back_and_other_versions_are_refused() {
@@ -90,18 +92,24 @@ fn results_read_back_and_other_versions_are_refused() {
     assert_eq!(again, results);
     assert_eq!(again.to_json(), text);
     assert_eq!(report::page(&again), report::page(&results));
-    let error = Results::from_json(&text.replacen("\"schema\": 1", "\"schema\": 9", 1)).unwrap_err();
-    assert_eq!(error, "schema: 9; expected 1, which this program reads");
+    let error = Results::from_json(&text.replacen("\"schema\": 2", "\"schema\": 9", 1)).unwrap_err();
+    assert_eq!(error, "schema: 9; expected 2, which this program reads");
     assert!(Results::from_json("{}").unwrap_err().contains("missing field `schema`"));
-    let damaged: [Damage; 4] = [
-        (|t| t.rows[1].cells[0].notes.push(99), "table `table7`: rows[1]: note 99; expected below 4"),
-        (|t| t.rows[0].cells.truncate(1), "rows[0]: 2 labels and 1 cells; expected 2 (at least 1) and 4"),
-        (|t| t.rows[0].labels.clear(), "rows[0]: 0 labels and 4 cells"),
+    let damaged: [Damage; 7] = [
+        (|t| t.table.rows[1].cells[0].notes.push(99), "table `table7`: rows[1]: note 99; expected below 4"),
+        (
+            |t| t.table.rows[0].cells.truncate(1),
+            "rows[0]: 2 labels and 1 cells; expected 2 (at least 1) and 4",
+        ),
+        (|t| t.table.rows[0].labels.clear(), "rows[0]: 0 labels and 4 cells"),
+        (|t| t.table.columns[1].key = "psnr".into(), "columns: `psnr` twice; expected each once"),
+        (|t| t.table.rows[1].id = t.table.rows[0].id.clone(), "twice; expected each once"),
+        (|t| t.paper.as_mut().unwrap().rows[0].labels.clear(), "table `table7-paper`: rows[0]: 0 labels"),
         (|t| t.comparisons[0].differences[0].decimals = usize::MAX, "expected at most 12"),
     ];
     for (damage, message) in damaged {
         let mut results = results.clone();
-        damage(&mut results.tables[0].table);
+        damage(&mut results.tables[0]);
         let error = Results::from_json(&results.to_json()).unwrap_err();
         assert!(error.contains(message), "{error}");
     }
@@ -155,8 +163,8 @@ fn a_table_without_data_shows_the_paper_s_alone() {
     let experiments = Experiment::embedded();
     let plan = plan(&experiments, &[], &options()).unwrap();
     let results = report::results(&plan, &experiments, &Records::new()).unwrap();
-    let table = &results.tables[0].table;
-    assert_eq!((table.source, table.rows.len(), results.missing()), (Source::Absent, 0, 0));
+    let table = &results.tables[0];
+    assert_eq!((table.source, table.table.rows.len(), results.missing()), (Source::Absent, 0, 0));
     let text = report::markdown(table);
     assert!(text.contains("Not run: no data for this table.") && text.contains("19.70"), "{text}");
 }
@@ -233,8 +241,8 @@ fn seeds_are_one_row_with_a_spread() {
         records
     });
     let cell = |kind, variant: &str| {
-        let of = |row: &&skinsplat::report::Row| row.kind == kind && row.labels[1] == variant;
-        table.rows.iter().find(of).unwrap().cells[0].clone()
+        let of = |row: &&Row| row.kind == kind && row.labels[1] == variant;
+        table.table.rows.iter().find(of).unwrap().cells[0].clone()
     };
     for kind in [RowKind::Measured, RowKind::Mean] {
         assert_eq!(cell(kind, "Matrices").text, "31.00 ± 1.41");
@@ -249,5 +257,5 @@ fn seeds_are_one_row_with_a_spread() {
     let markdown = report::markdown(&table);
     assert!(markdown.contains("+2.000 ± 1.414 over seeds"), "{markdown}");
     assert!(markdown.contains("over the seeds 0, 1"), "{markdown}");
-    assert!(report::csv(&table).lines().next().unwrap().contains("psnr sd"));
+    assert!(csv(&table.table).lines().next().unwrap().contains("psnr sd"));
 }

@@ -51,18 +51,21 @@ fn every_cell_has_a_value_or_a_word_and_every_thread_count_the_same() {
         pool.install(|| Report::new(true, sections.map(examined).to_vec(), Vec::new()))
     };
     let (one, two) = (report(1), report(2));
-    assert_eq!(one.json().unwrap(), two.json().unwrap());
+    assert_eq!(one.json(), two.json());
     assert_eq!(one.markdown(), two.markdown());
-    let csv = one.csv().unwrap();
+    let csv = one.csv();
     let rows: usize = one.sections.iter().map(|s| s.rows.len()).sum();
     assert_eq!(csv.lines().count(), rows + 1);
+    for table in one.sections.iter().flat_map(|s| &s.tables) {
+        table.check().unwrap();
+    }
     for row in one.sections.iter().flat_map(|s| &s.rows) {
         for cell in [row.rotation_error, row.error, row.equivariance, row.jump] {
             assert!(cell.value().is_none_or(f64::is_finite) && cell != Cell::Word(""), "{row:?}");
         }
         assert_ne!(row.deterministic, Cell::Flag(false), "{row:?}");
     }
-    for text in [csv, one.markdown(), one.json().unwrap()] {
+    for text in [csv, one.markdown(), one.json()] {
         assert!(!text.contains("NaN") && !text.contains("null"), "a number without a word");
     }
 }

@@ -7,6 +7,7 @@ use skinsplat_core::scene::{Binding, Body, Pose, RestBody};
 use skinsplat_data::{body, ply, poses};
 use skinsplat_posing::needs::{Degrees, Extreme, Needs};
 use skinsplat_posing::{BoundAvatar, RotationChoice};
+use skinsplat_table::{Cell, Column, Label, Row, Table, text};
 use std::path::{Path, PathBuf};
 
 /// Pairs that are listed; JSON has them all.
@@ -68,7 +69,7 @@ impl Motion {
         let needs = Needs::new(&bound, &rest, &motion, &choices, self.tolerance)?;
         match self.format {
             Format::Json => emit_json(&needs),
-            Format::Text => emit(&format!("{}\n{}", avatar.display(), text(&needs, &rest))),
+            Format::Text => emit(&format!("{}\n{}", avatar.display(), described(&needs, &rest))),
         }
     }
 
@@ -87,7 +88,7 @@ impl Motion {
     }
 }
 
-fn text(needs: &Needs, body: &RestBody) -> String {
+fn described(needs: &Needs, body: &RestBody) -> String {
     let mut text = line("Gaussians", needs.gaussians) + &line("poses", needs.poses);
     text += &line("SH degree", format!("{} of {} stored", needs.sh_degree_present, needs.sh_degree_stored));
     let share = |(n, count): (usize, &u64)| {
@@ -106,24 +107,32 @@ fn text(needs: &Needs, body: &RestBody) -> String {
     text += &line("its bound", at(needs.gap_bound, ""));
     let mut widest: Vec<_> = needs.pairs.iter().collect();
     widest.sort_by(|a, b| b.worst_angle.value.total_cmp(&a.worst_angle.value));
-    text += "  joints that share Gaussians, widest first\n";
-    for pair in widest.iter().take(LISTED_PAIRS) {
+    let pairs = widest.iter().take(LISTED_PAIRS).map(|pair| {
         let [a, b] = pair.joints.map(name);
-        let value = format!("{}, {} Gaussians", at(pair.worst_angle, "°"), pair.gaussians);
-        text += &format!("    {:<24} {value}\n", format!("{a} - {b}"));
-    }
+        (format!("{a} - {b}"), format!("{}, {} Gaussians", at(pair.worst_angle, "°"), pair.gaussians))
+    });
+    text += &list("joints that share Gaussians, widest first", pairs);
     if widest.len() > LISTED_PAIRS {
         text += &format!("    and {} more\n", widest.len() - LISTED_PAIRS);
     }
-    text += "  farthest from the exact average that it can be (proved + rounding to f32)\n";
-    for bound in &needs.bounds {
-        text += &format!("    {:<24} {}\n", bound.rotation.to_string(), bound.degrees);
-    }
-    text += "  exact average of the heaviest influences only\n";
-    for (kept, degrees) in needs.fewer_influences.iter().enumerate() {
-        text += &format!("    {:<24} {degrees}\n", kept + 1);
-    }
+    let bounds = needs.bounds.iter().map(|bound| (bound.rotation.to_string(), bound.degrees.to_string()));
+    text += &list("farthest from the exact average that it can be (proved + rounding to f32)", bounds);
+    let fewer =
+        (1..).zip(&needs.fewer_influences).map(|(kept, degrees)| (format!("{kept}"), degrees.to_string()));
+    text += &list("exact average of the heaviest influences only", fewer);
     text + &line("verdict", &needs.verdict)
+}
+
+/// Names and values under a heading.
+fn list(heading: &str, rows: impl Iterator<Item = (String, String)>) -> String {
+    let row = |(name, value): (String, String)| Row::new(&name, [heading, &name], vec![Cell::text(value)]);
+    let table = Table {
+        labels: vec![Label::new("list", "").once(), Label::new("name", "")],
+        columns: vec![Column::text("value", "")],
+        rows: rows.map(row).collect(),
+        ..Table::default()
+    };
+    text::rows(&table).lines().map(|line| format!("  {line}\n")).collect()
 }
 
 fn at(extreme: Extreme, unit: &str) -> String {

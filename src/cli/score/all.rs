@@ -1,13 +1,13 @@
 //! `reproduce score --protocol all`: the same frames under every protocol, a row each.
 
 use super::pairs::{self, Pair};
-use super::{Context, Format, Score, emit, emit_json};
+use super::{Context, Score, emit, emit_json, written};
 use anyhow::{Context as _, Result};
 use serde_json::json;
 use skinsplat_metrics::lpips::OneFrame;
 use skinsplat_metrics::lpips::weights::Networks;
 use skinsplat_metrics::{FrameScore, MetricsError, PROTOCOLS, Protocol, Region, Summary, Truth, Wanted};
-use std::fmt::Write;
+use skinsplat_table::{self as table, Column, Content, Digits, Direction, Label, Table};
 
 /// What stands for all protocols.
 pub(super) const ID: &str = "all";
@@ -47,9 +47,9 @@ pub(super) fn run(arguments: &Score, pairs: &[Pair], context: Context) -> Result
         rows.push(Row { protocol, outcome, lpips_missing, over_another_background });
     }
     rows.reverse();
-    match arguments.format {
-        Format::Json => emit_json(&json(&rows, pairs.len())),
-        Format::Text => emit(&text(&rows, pairs.len())),
+    match arguments.format.as_str() {
+        "json" => emit_json(&json(&rows, pairs.len())),
+        format => emit(&written(&table(&rows, pairs.len()), format)),
     }
 }
 
@@ -89,62 +89,75 @@ fn json(rows: &[Row], frames: usize) -> serde_json::Value {
     json!({ "frames": frames, "protocols": rows.iter().map(row).collect::<Vec<_>>() })
 }
 
-const TITLES: [&str; 8] =
-    ["protocol", "PSNR", "SSIM", "LPIPS", "background", "region", "SSIM variant", "LPIPS variant"];
-
-/// A Markdown table whose columns line up, and notes below it.
-fn text(rows: &[Row], frames: usize) -> String {
-    let (cells, notes): (Vec<_>, Vec<_>) = rows.iter().map(|row| (cells(row), notes(row, frames))).unzip();
-    let width = |column: usize| {
-        let widths = cells.iter().map(|cells: &[String; 8]| cells[column].chars().count());
-        widths.chain([TITLES[column].len()]).max().unwrap_or(0)
+/// A row per protocol, with its choices.
+fn table(rows: &[Row], frames: usize) -> Table {
+    let metric =
+        |key: &str, title: &str, (digits, better)| Column::new(key, title).digits(digits).better(better);
+    let choices = [
+        ("background", "background"),
+        ("region", "region"),
+        ("ssim_variant", "SSIM variant"),
+        ("lpips_variant", "LPIPS variant"),
+    ];
+    let mut table = Table {
+        sentences: vec![format!("{frames} frames"), spread(rows)],
+        labels: vec![Label::new("protocol", "protocol")],
+        columns: vec![
+            metric("psnr", "PSNR", (PSNR, Direction::Higher)),
+            metric("ssim", "SSIM", (OTHERS, Direction::Higher)),
+            metric("lpips", "LPIPS", (OTHERS, Direction::Lower)),
+        ],
+        ..Table::new("protocols", "The same frames under every protocol")
     };
-    let widths: [usize; 8] = std::array::from_fn(width);
-    let line = |cells: &[String; 8]| {
-        let cells = cells.iter().zip(widths).map(|(cell, width)| format!(" {cell:width$} |"));
-        format!("|{}\n", cells.collect::<String>())
-    };
-    let mut text = line(&TITLES.map(str::to_owned));
-    text += &line(&widths.map(|width| "-".repeat(width)));
-    text.extend(cells.iter().map(line));
-    let _ = writeln!(text, "\n{frames} frames. {}", spread(rows));
-    text.extend(notes);
-    text
+    table.columns.extend(choices.map(|(key, title)| Column::text(key, title)));
+    for row in rows {
+        let key = row.protocol.key().to_string();
+        let cells = cells(row, frames, &mut table.notes);
+        table.rows.push(skinsplat_table::Row::new(&key, [&key], cells));
+    }
+    table
 }
 
-fn cells(row: &Row) -> [String; 8] {
+/// As printed.
+const PSNR: Digits = Digits::Decimals(3);
+const OTHERS: Digits = Digits::Decimals(5);
+
+fn cells(row: &Row, frames: usize, notes: &mut Vec<String>) -> Vec<table::Cell> {
     let protocol = row.protocol;
-    let id = protocol.key().to_string();
-    let known =
-        |value: Option<f64>| value.map_or_else(|| "not computed".to_owned(), |value| format!("{value:.5}"));
-    let [psnr, ssim, lpips] = match &row.outcome {
-        Err(_) => ["not computed".to_owned(), "-".to_owned(), "-".to_owned()],
-        Ok(summary) => [format!("{:.3}", summary.psnr), known(summary.ssim), known(summary.lpips)],
+    let known = |value: Option<f64>, digits| {
+        let cell = table::Cell::new(Content::NotComputed, digits);
+        value.map_or(cell, |value| table::Cell::number(value, digits))
     };
-    let background = match protocol.background_colour() {
-        Some([r, g, b]) => format!("{r},{g},{b}"),
-        None => "captured".to_owned(),
+    let summary = row.outcome.as_ref().ok();
+    let mut metrics = [
+        known(summary.map(|s| s.psnr), PSNR),
+        known(summary.and_then(|s| s.ssim), OTHERS),
+        known(summary.and_then(|s| s.lpips), OTHERS),
+    ];
+    let mut note = |note: String, cells: &mut [table::Cell]| {
+        cells.iter_mut().for_each(|cell| cell.notes.push(notes.len()));
+        notes.push(note);
     };
-    let region = Region::id(protocol.region).to_owned();
-    [id, psnr, ssim, lpips, background, region, protocol.ssim.id().to_owned(), protocol.lpips.id().to_owned()]
-}
-
-fn notes(row: &Row, frames: usize) -> String {
-    let id = &row.protocol.id;
-    let mut notes = String::new();
-    let reason = row.outcome.as_ref().err().or(row.lpips_missing.as_ref());
-    if let Some(reason) = reason {
-        let _ = writeln!(notes, "{id}: not computed: {reason}");
+    let reason = |reason: &str| format!("{}: not computed: {reason}", protocol.id);
+    match (&row.outcome, &row.lpips_missing) {
+        (Err(why), _) => note(reason(why), &mut metrics),
+        (Ok(_), Some(why)) => note(reason(why), &mut metrics[2..]),
+        (Ok(_), None) => {}
     }
     if row.over_another_background > 0 {
-        let _ = writeln!(
-            notes,
-            "{id}: {} of {frames} renders lie over another background than its own: not its number; --background R,G,B \
-             puts the truth over theirs",
-            row.over_another_background
+        note(
+            format!(
+                "{}: {} of {frames} renders lie over another background than its own: not its number; --background \
+                 R,G,B puts the truth over theirs",
+                protocol.id, row.over_another_background
+            ),
+            &mut metrics,
         );
     }
-    notes
+    let background =
+        protocol.background_colour().map_or("captured".to_owned(), |[r, g, b]| format!("{r},{g},{b}"));
+    let choices = [Region::id(protocol.region), protocol.ssim.id(), protocol.lpips.id()].map(str::to_owned);
+    metrics.into_iter().chain([background].into_iter().chain(choices).map(table::Cell::text)).collect()
 }
 
 /// How far the protocols lie apart: those of the whole image, with renders over the right background.
@@ -159,7 +172,7 @@ fn spread(rows: &[Row]) -> String {
         format!("{low:.digits$} to {high:.digits$}")
     };
     format!(
-        "The protocol alone, whole images: PSNR {}, SSIM {}, LPIPS {}.",
+        "The protocol alone, whole images: PSNR {}, SSIM {}, LPIPS {}",
         range(&|summary| Some(summary.psnr), 3),
         range(&|summary| summary.ssim, 5),
         range(&|summary| summary.lpips, 5)

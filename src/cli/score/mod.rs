@@ -2,9 +2,10 @@
 
 mod all;
 mod pairs;
+mod summary;
 
 use super::lpips::LpipsWeights;
-use super::output::{Format, emit, emit_json};
+use super::output::{emit, emit_json, table_format, written};
 use super::selection::parse_colour;
 use super::{Context, Exit};
 use anyhow::{Context as _, Result};
@@ -15,8 +16,9 @@ use skinsplat_core::scene::Image;
 use skinsplat_metrics::lpips::OneFrame;
 use skinsplat_metrics::lpips::weights::Networks;
 use skinsplat_metrics::{
-    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Summary, Truth, Wanted, all_variants,
+    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Truth, Wanted, all_variants,
 };
+use skinsplat_table::{Table, text};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -29,7 +31,7 @@ use std::path::PathBuf;
 ///
 /// An alpha channel of the truth is its mask, unless --mask names another, and is composited over the background. In JSON,
 /// `null` stands for an infinite PSNR (identical images); a variant that cannot be computed is listed under "not_computed"
-/// with the reason.
+/// with the reason. The other formats hold one table.
 ///
 /// Images are PNG (grey, grey with alpha, RGB, RGBA, palettes; 1 to 16 bits, as v / 65535), JPEG (turned as their Exif
 /// orientation says) or .npy arrays (H, W, 3 or 4); render, truth and mask must have one size. Masks are grey.
@@ -56,8 +58,8 @@ pub(super) struct Score {
     #[arg(long, value_name = "R,G,B", value_parser = parse_colour)]
     background: Option<[f32; 3]>,
     /// How to print the scores
-    #[arg(long, value_enum, default_value_t)]
-    format: Format,
+    #[arg(long, value_name = "FORMAT", value_parser = table_format(), default_value = "text")]
+    format: String,
 }
 
 const EXAMPLES: &str = "\
@@ -95,9 +97,9 @@ impl Score {
         let score = |pair: &Pair| self.score(pair, protocol.as_ref(), &networks);
         let scored = pairs::each(&pairs()?, context, score)?;
         warn_of_backgrounds(&scored, context);
-        match (folders, self.format) {
-            (false, Format::Json) => emit_json(&scored[0])?,
-            (false, Format::Text) => emit(&scored[0].text())?,
+        match (folders, self.format.as_str()) {
+            (false, "json") => emit_json(&scored[0])?,
+            (false, format) => emit_table(&summary::table(&scored, None, None), format)?,
             (true, format) => emit_folder(&scored, protocol.as_ref(), format)?,
         }
         Ok(Exit::Success)
@@ -159,61 +161,25 @@ fn warn_of_backgrounds(scored: &[Scored], context: Context) {
     }
 }
 
-fn emit_folder(scored: &[Scored], protocol: Option<&Protocol>, format: Format) -> Result<()> {
+fn emit_folder(scored: &[Scored], protocol: Option<&Protocol>, format: &str) -> Result<()> {
     let mean = means(scored);
     let scores: Option<Vec<FrameScore>> = scored.iter().map(|frame| frame.protocol.clone()).collect();
     let summary = match (protocol, scores) {
         (Some(protocol), Some(scores)) => Some(protocol.aggregate(&scores)?),
         _ => None,
     };
-    if format == Format::Json {
+    if format == "json" {
         let frames: BTreeMap<&str, &Scored> = scored.iter().map(|f| (f.name.as_str(), f)).collect();
         return emit_json(&json!({ "frames": frames, "mean": mean, "protocol": summary }));
     }
-    let missing = scored.iter().find_map(|frame| frame.protocol.as_ref()?.lpips_missing.as_deref());
-    let mean = Scored {
-        name: format!("mean of {} frames", scored.len()),
-        variants: mean,
-        not_computed: Map::new(),
-        protocol: None,
-        over_another_background: false,
-    };
-    emit(&(scored.iter().map(Scored::text).collect::<String>() + &mean.text()))?;
-    if let Some(Summary { protocol, psnr, ssim, lpips, .. }) = &summary {
-        emit(&protocol_line(protocol, *psnr, *ssim, *lpips, missing))?;
-    }
-    Ok(())
+    emit_table(&summary::table(scored, Some(&mean), summary.as_ref()), format)
 }
 
-fn protocol_line(
-    protocol: &impl std::fmt::Display,
-    psnr: f64,
-    ssim: Option<f64>,
-    lpips: Option<f64>,
-    missing: Option<&str>,
-) -> String {
-    let known = |value: Option<f64>, missing: &str| {
-        value.map_or_else(|| format!("not computed ({missing})"), |value| format!("{value:.6}"))
-    };
-    let (ssim, lpips) = (known(ssim, "not asked for"), known(lpips, missing.unwrap_or("no reason given")));
-    format!("protocol {protocol}: psnr {psnr:.6}  ssim {ssim}  lpips {lpips}\n")
-}
-
-impl Scored {
-    fn text(&self) -> String {
-        let mut text = format!("{}\n", self.name);
-        for (id, value) in &self.variants {
-            let value = value.as_f64().map_or("inf".to_owned(), |v| format!("{v:.6}"));
-            text += &format!("  {id:36} {value}\n");
-        }
-        for (id, reason) in &self.not_computed {
-            text += &format!("  {id:36} not computed: {}\n", reason.as_str().unwrap_or_default());
-        }
-        if let Some(FrameScore { protocol, psnr, ssim, lpips, lpips_missing, .. }) = &self.protocol {
-            text += "  ";
-            text += &protocol_line(protocol, *psnr, *ssim, *lpips, lpips_missing.as_deref());
-        }
-        text
+/// Terminals get the rows without headings, and notes.
+fn emit_table(table: &Table, format: &str) -> Result<()> {
+    match format {
+        "text" => emit(&(text::rows(table) + &text::notes(table))),
+        format => emit(&written(table, format)),
     }
 }
 

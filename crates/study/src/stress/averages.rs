@@ -3,12 +3,15 @@
 use super::exact::Exact;
 use super::method::{Answer, METHODS, Method};
 use super::problem::{FAMILIES, Family, Problem, random_rotation};
-use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, exactly, shown};
+use super::table::{
+    Cell, Findings, LIMITS, Row, Threshold, Verdict, bisect, column, exactly, label, line as row, shown,
+};
 use rayon::prelude::*;
 use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::math::rotation::angle_between;
 use skinsplat_core::math::{Matrix3, Quaternion, Real, matrix3, rotation};
+use skinsplat_table::{self as table, Table};
 
 const SECTION: &str = "averages";
 
@@ -41,9 +44,9 @@ pub(super) fn run(quick: bool) -> Findings {
     let mut findings =
         Findings { section: SECTION, title: "Solvers on hard averages", ..Findings::default() };
     for (lines, tasks) in lines.chunks(FAMILIES.len() * METHODS.len()).zip(["f64", "f32"]) {
-        findings.grids.push(verdicts(tasks, lines));
+        findings.tables.push(verdicts(tasks, lines));
     }
-    findings.grids.push(invariances(&lines));
+    findings.tables.push(invariances(&lines));
     for line in lines {
         findings.rows.extend(line.rows);
         findings.thresholds.extend(line.threshold);
@@ -264,38 +267,40 @@ impl Invariance {
     }
 }
 
-fn verdicts(precision: &str, lines: &[Line]) -> Grid {
-    let headings =
-        std::iter::once("method".to_owned()).chain(FAMILIES.iter().map(|f| f.id.to_owned())).collect();
-    let row = |(method, lines): (&Method, &[Line])| {
-        std::iter::once(method.to_string()).chain(lines.iter().map(summary)).collect()
+fn verdicts(precision: &str, lines: &[Line]) -> Table {
+    let line =
+        |(method, lines): (&Method, &[Line])| row([method.to_string()], lines.iter().map(summary).collect());
+    // The families are the same in both precisions: explained once.
+    let family = |family: &Family| match precision {
+        "f64" => column(family.id).about(format!("{}; the axis is {}", family.about, family.axis)),
+        _ => column(family.id),
     };
-    let rows = METHODS.iter().zip(lines.chunks(FAMILIES.len())).map(row).collect();
-    let axes = FAMILIES.iter().map(|f| format!("{}: {}; the axis is {}", f.id, f.about, f.axis));
-    Grid {
-        title: format!("Against the exact answer, {precision}"),
-        notes: if precision == "f64" { axes.collect() } else { Vec::new() },
-        headings,
-        rows,
+    Table {
+        labels: vec![label("method")],
+        columns: FAMILIES.iter().map(family).collect(),
+        rows: METHODS.iter().zip(lines.chunks(FAMILIES.len())).map(line).collect(),
+        ..Table::new(format!("averages-{precision}"), format!("Against the exact answer, {precision}"))
     }
 }
 
-fn summary(line: &Line) -> String {
+fn summary(line: &Line) -> table::Cell {
     if let Some(threshold) = &line.threshold {
-        return format!("breaks at {}", shown(threshold.breaks_at));
+        return threshold.cell();
     }
     let worst = line.rows.iter().map(|row| row.verdict).max().unwrap_or(Verdict::Holds);
     let first = line.rows.iter().find(|row| row.verdict == worst);
     match (worst, first) {
-        (Verdict::Holds, _) | (_, None) => "holds".to_owned(),
-        (Verdict::Degrades, Some(row)) => format!("degrades at {}", row.input),
-        (Verdict::Breaks, Some(_)) => "breaks".to_owned(),
+        (Verdict::Holds, _) | (_, None) => table::Cell::text("holds"),
+        (Verdict::Degrades, Some(row)) => {
+            let words = format!("degrades at {}", row.input);
+            row.input.parse().map_or_else(|_| table::Cell::text(&words), |at| table::Cell::phrase(at, &words))
+        }
+        (Verdict::Breaks, Some(_)) => table::Cell::text("breaks"),
     }
 }
 
-fn invariances(lines: &[Line]) -> Grid {
-    let headings =
-        ["method", "precision", "world turned", "rest pose turned", "signs", "order", "one bone split"];
+fn invariances(lines: &[Line]) -> Table {
+    let columns = ["world turned", "rest pose turned", "signs", "order", "one bone split"];
     let mut rows = Vec::new();
     let by_method = lines.chunks(FAMILIES.len());
     let subjects = ["f64", "f32"].into_iter().flat_map(|p| METHODS.iter().map(move |m| (p, m)));
@@ -303,17 +308,16 @@ fn invariances(lines: &[Line]) -> Grid {
         let mut worst = Invariance::default();
         lines.iter().for_each(|line| worst.take_worst(Some(&line.invariance)));
         let numbers = [worst.world, worst.rest, worst.signs, worst.order, worst.split];
-        let cells = numbers.map(|v| Cell::number(v).to_string());
-        rows.push([method.to_string(), precision.to_owned()].into_iter().chain(cells).collect());
+        let cells = numbers.map(|v| Cell::number(v).into()).into();
+        rows.push(row([method.to_string(), precision.to_owned()], cells));
     }
-    Grid {
-        title: "What should not matter: largest change of the answer, degrees".to_owned(),
-        notes: vec![format!(
-            "Over the inputs that determine the answer to {}° or better.",
-            shown(LIMITS.degrees[0])
-        )],
-        headings: headings.map(str::to_owned).to_vec(),
+    let least = shown(LIMITS.degrees[0]);
+    Table {
+        labels: vec![label("method"), label("precision")],
+        columns: columns.map(column).into(),
         rows,
+        remarks: vec![format!("Over the inputs that determine the answer to {least}° or better.")],
+        ..Table::new("invariances", "What should not matter: largest change of the answer, degrees")
     }
 }
 

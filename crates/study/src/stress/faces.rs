@@ -1,11 +1,12 @@
 //! Section `faces`: frames on triangles that are slivers, tiny, far away, inverted or without area.
 
 use super::averages::rotation_error;
-use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, exactly};
+use super::table::{Cell, Findings, LIMITS, Row, Threshold, Verdict, bisect, exactly, label, line, words};
 use glam::DVec3;
 use skinsplat_core::math::rotation::{angle_between, polar};
 use skinsplat_core::math::{Matrix3, Quaternion, matrix3};
 use skinsplat_posing::{FaceFrame, RotationChoice, face_frame};
+use skinsplat_table::{self as table, Table};
 
 const SECTION: &str = "faces";
 
@@ -94,17 +95,16 @@ fn measure(kind: FaceFrame, family: &Family, x: f64) -> Option<Measured> {
 /// The section.
 pub(super) fn run() -> Findings {
     let mut findings = Findings { section: SECTION, title: "Frames on bad faces", ..Findings::default() };
-    let mut grid = Grid {
-        title: "Degrees off the frame of the same face in f64".to_owned(),
-        headings: ["frame", "family", "axis"].map(str::to_owned).to_vec(),
-        notes: vec![
+    let mut table = Table {
+        labels: ["frame", "family", "axis"].map(label).into(),
+        columns: vec![words("value: degrees")],
+        remarks: vec![
             "A face whose |edge × side| is at most 1e-5 |edge| |side| has no frame; its Gaussians turn with the quaternion \
              average. The corners are rounded to f32 before the frame is made, as the posed mesh is."
                 .to_owned(),
         ],
-        rows: Vec::new(),
+        ..Table::new("frames", "Degrees off the frame of the same face in f64")
     };
-    grid.headings.push("value: degrees".to_owned());
     for kind in KINDS {
         for family in &FAMILIES {
             let mut cells = Vec::new();
@@ -153,15 +153,12 @@ pub(super) fn run() -> Findings {
                     sound = Some(x);
                 }
             }
-            grid.rows.push(vec![
-                RotationChoice::FaceFrame(kind).to_string(),
-                family.id.to_owned(),
-                family.axis.to_owned(),
-                cells.join(", "),
-            ]);
+            let labels =
+                [RotationChoice::FaceFrame(kind).to_string(), family.id.to_owned(), family.axis.to_owned()];
+            table.rows.push(line(labels, vec![table::Cell::text(cells.join(", "))]));
         }
     }
-    findings.grids.push(grid);
+    findings.tables.push(table);
     findings.causes = vec![
         "The normal of a sliver is its edges' rounding over their sine: on a body one metre from the origin, a corner \
          stored in f32 is off by 6e-8 m, which turns the frame of a 1 cm face by a degree once it is lower than some \

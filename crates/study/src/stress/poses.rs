@@ -2,7 +2,7 @@
 
 use super::averages::rotation_error;
 use super::stage;
-use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, shown};
+use super::table::{Cell, Findings, LIMITS, Row, Threshold, Verdict, column, label, line, shown, words};
 use glam::{DMat3, DQuat, DVec3, Mat3};
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -11,6 +11,7 @@ use skinsplat_core::math::portable;
 use skinsplat_core::math::rotation::{angle_between, multiply};
 use skinsplat_core::scene::{OwnedPosed, Pose, PosedBody, RestBody};
 use skinsplat_posing::{BoundAvatar, PosingError, Strategy, pose};
+use skinsplat_table::{self as table, Table};
 
 const SECTION: &str = "poses";
 
@@ -144,26 +145,26 @@ pub(super) fn run(quick: bool) -> Result<Findings, PosingError> {
     let mut findings =
         Findings { section: SECTION, title: "Strategies on hard poses", ..Findings::default() };
     let cases: Vec<&Case> = CASES.iter().step_by(if quick { 3 } else { 1 }).collect();
-    let mut grid = Grid {
-        title: format!("Worst of {} Gaussians", bound.len()),
-        headings: std::iter::once("strategy").chain(cases.iter().map(|c| c.id)).map(str::to_owned).collect(),
-        notes: vec![
+    let mut table = Table {
+        labels: vec![label("strategy")],
+        columns: cases.iter().map(|case| words(case.id)).collect(),
+        remarks: vec![
             "holds; or what is wrong: r = off being a rotation (largest entry of RᵀR − I), w = degrees by which a turn of \
              the world is not followed. Affine covariances are no rotations by design: their r says by how much."
                 .to_owned(),
         ],
-        rows: Vec::new(),
+        ..Table::new("poses", format!("Worst of {} Gaussians", bound.len()))
     };
     for strategy in &strategies {
-        let mut line = vec![strategy.to_string()];
+        let mut cells = Vec::new();
         for case in &cases {
             let row = row(strategy, case.id, &stage.outcome(strategy, &(case.make)(&body))?);
-            line.push(shown_row(&row));
+            cells.push(table::Cell::text(shown_row(&row)));
             findings.rows.push(row);
         }
-        grid.rows.push(line);
+        table.rows.push(line([strategy.to_string()], cells));
     }
-    findings.grids.push(grid);
+    findings.tables.push(table);
     shifts(&stage, &strategies, &mut findings)?;
     findings.causes = causes();
     Ok(findings)
@@ -211,12 +212,10 @@ fn shown_row(row: &Row) -> String {
 fn shifts(stage: &Stage<'_>, strategies: &[Strategy], findings: &mut Findings) -> Result<(), PosingError> {
     let at = second(stage.body, DVec3::new(0.9, 0.4, 0.7));
     let home = PosedBody::new(stage.body, &at)?;
-    let mut grid = Grid {
-        title: "The body shifted: largest change of a rotation, degrees".to_owned(),
-        headings: std::iter::once("strategy".to_owned())
-            .chain(SHIFTS.map(|d| format!("{} m", shown(d))))
-            .collect(),
-        ..Grid::default()
+    let mut table = Table {
+        labels: vec![label("strategy")],
+        columns: SHIFTS.map(|d| column(format!("{} m", shown(d)))).into(),
+        ..Table::new("shifts", "The body shifted: largest change of a rotation, degrees")
     };
     let bodies = SHIFTS
         .map(|shift| PosedBody::new(stage.body, &stage::moved(&at, DQuat::IDENTITY, DVec3::splat(shift))));
@@ -260,10 +259,10 @@ fn shifts(stage: &Stage<'_>, strategies: &[Strategy], findings: &mut Findings) -
                 axis: "metres".to_owned(),
             });
         }
-        let cells = changes.iter().map(|&change| Cell::number(change).to_string());
-        grid.rows.push(std::iter::once(strategy.to_string()).chain(cells).collect());
+        let cells = changes.iter().map(|&change| Cell::number(change).into());
+        table.rows.push(line([strategy.to_string()], cells.collect()));
     }
-    findings.grids.push(grid);
+    findings.tables.push(table);
     Ok(())
 }
 

@@ -1,10 +1,13 @@
 //! Section `renderer`: the splat renderer on extreme scenes, against the definition of the image in `f64`.
 
 use super::scenes::{FAMILIES, Family, Scene};
-use super::table::{Cell, Findings, Grid, LIMITS, Row, Threshold, Verdict, bisect, exactly, shown};
+use super::table::{
+    Cell, Findings, LIMITS, Row, Threshold, Verdict, bisect, column, exactly, label, line, shown, words,
+};
 use skinsplat_core::scene::{Camera, Rendered, SceneError};
 use skinsplat_render::splat::{Renderer, SimdLevel, render};
 use skinsplat_render::{View, definition};
+use skinsplat_table::{self as table, Table};
 
 const SECTION: &str = "renderer";
 
@@ -73,10 +76,12 @@ fn same_every_way(scene: &Scene, own: &Rendered) -> bool {
 pub(super) fn run(quick: bool) -> Result<Findings, SceneError> {
     let mut findings =
         Findings { section: SECTION, title: "The splat renderer on extreme scenes", ..Findings::default() };
-    let mut grid = Grid {
-        title: "Difference from the image of the definition in f64 (99 % of the pixels within), channels in [0, 1]".to_owned(),
-        headings: ["family", "axis", "verdict", "value: difference"].map(str::to_owned).to_vec(),
-        ..Grid::default()
+    let title =
+        "Difference from the image of the definition in f64 (99 % of the pixels within), channels in [0, 1]";
+    let mut table = Table {
+        labels: ["family", "axis"].map(label).into(),
+        columns: vec![column("verdict"), words("value: difference")],
+        ..Table::new("scenes", title)
     };
     for family in &FAMILIES {
         let points: Vec<f64> =
@@ -99,11 +104,11 @@ pub(super) fn run(quick: bool) -> Result<Findings, SceneError> {
             findings.rows.push(row);
         }
         let broken = findings.thresholds.iter().find(|t| t.family == family.id);
-        let verdict =
-            broken.map_or_else(|| worst.to_string(), |t| format!("breaks at {}", shown(t.breaks_at)));
-        grid.rows.push(vec![family.id.to_owned(), family.axis.to_owned(), verdict, cells.join(", ")]);
+        let verdict = broken.map_or_else(|| table::Cell::text(worst.to_string()), Threshold::cell);
+        let labels = [family.id.to_owned(), family.axis.to_owned()];
+        table.rows.push(line(labels, vec![verdict, table::Cell::text(cells.join(", "))]));
     }
-    findings.grids.push(grid);
+    findings.tables.push(table);
     findings.causes = causes();
     Ok(findings)
 }

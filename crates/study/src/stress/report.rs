@@ -1,8 +1,9 @@
 //! Findings as Markdown, CSV and JSON.
 
-use super::table::{Findings, Grid, LIMITS, Limits, Verdict};
+use super::table::{Findings, LIMITS, Limits, Row, Verdict, column, label, line, words};
 use serde::Serialize;
 use skinsplat_core::scene::Image;
+use skinsplat_table::{Cell, Table, csv, markdown as write, to_json};
 use std::fmt::Write;
 
 /// A rendered failure.
@@ -35,7 +36,7 @@ pub struct Report {
 impl Report {
     /// A report of sections.
     pub fn new(quick: bool, sections: Vec<Findings>, pictures: Vec<Picture>) -> Self {
-        Self { schema: "stress-1", limits: LIMITS, quick, sections, pictures }
+        Self { schema: "stress-2", limits: LIMITS, quick, sections, pictures }
     }
 
     /// How many rows have a verdict.
@@ -63,12 +64,13 @@ impl Report {
         );
         for section in &self.sections {
             let _ = write!(text, "\n## {}\n", section.title);
-            for grid in &section.grids {
-                text += &table(grid);
+            for table in &section.tables {
+                let (title, grid) = (write::escape(&table.title), write::grid(table));
+                let _ = write!(text, "\n### {title}\n\n{grid}{}", write::notes(table));
             }
             if !section.causes.is_empty() {
                 text += "\nCauses:\n\n";
-                section.causes.iter().for_each(|cause| text += &format!("- {cause}\n"));
+                section.causes.iter().for_each(|cause| text += &format!("- {}\n", write::prose(cause)));
             }
         }
         if !self.pictures.is_empty() {
@@ -81,35 +83,35 @@ impl Report {
     }
 
     /// Every row, for programs.
-    ///
-    /// # Errors
-    /// None that memory does not cause.
-    pub fn csv(&self) -> Result<String, csv::Error> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        for row in self.sections.iter().flat_map(|s| &s.rows) {
-            writer.serialize(row)?;
-        }
-        let bytes = writer.into_inner().map_err(|error| error.into_error())?;
-        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    pub fn csv(&self) -> String {
+        csv(&self.measurements())
     }
 
     /// All of it, for programs.
-    ///
-    /// # Errors
-    /// None that memory does not cause.
-    pub fn json(&self) -> Result<String, serde_json::Error> {
-        Ok(serde_json::to_string_pretty(self)? + "\n")
+    pub fn json(&self) -> String {
+        to_json(self)
+    }
+
+    /// Every row of every section as one table.
+    fn measurements(&self) -> Table {
+        let labels = ["section", "family", "input", "subject", "precision"];
+        let values = ["finite", "rotation_error", "error", "equivariance", "jump", "deterministic"];
+        let columns = values.map(column).into_iter().chain(["verdict", "note"].map(words));
+        let rows = self.sections.iter().flat_map(|section| &section.rows).map(measurement);
+        Table {
+            labels: labels.map(label).into(),
+            columns: columns.collect(),
+            rows: rows.collect(),
+            ..Table::new("stress", "Numerical stability at the extremes")
+        }
     }
 }
 
-fn table(grid: &Grid) -> String {
-    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-    let mut text = format!("\n### {}\n\n{}", grid.title, line(&grid.headings));
-    text += &line(&grid.headings.iter().map(|_| "---".to_owned()).collect::<Vec<_>>());
-    grid.rows.iter().for_each(|row| text += &line(row));
-    if !grid.notes.is_empty() {
-        text += "\n";
-        grid.notes.iter().for_each(|note| text += &format!("- {note}\n"));
-    }
-    text
+fn measurement(row: &Row) -> skinsplat_table::Row {
+    let Row { finite, rotation_error, error, equivariance, jump, deterministic, .. } = *row;
+    let values = [finite, rotation_error, error, equivariance, jump, deterministic];
+    let said = [row.verdict.to_string(), row.note.clone()];
+    let cells = values.map(Cell::from).into_iter().chain(said.map(Cell::text));
+    let labels = [row.section, &row.family, &row.input, &row.subject, row.precision].map(str::to_owned);
+    line(labels, cells.collect())
 }

@@ -1,13 +1,14 @@
 //! Section `scales`: covariance factors of extreme size and condition, and SH of extreme size.
 
 use super::stage;
-use super::table::{Cell, Findings, Grid, LIMITS, Row, Verdict, shown};
+use super::table::{Cell, Findings, LIMITS, Row, Verdict, column, label, line, shown};
 use glam::{DVec3, Vec3};
 use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::math::{Quaternion, Real, sh};
 use skinsplat_core::scene::{Avatar, PosedBody, RestBody};
 use skinsplat_posing::{BoundAvatar, ColourChoice, CovarianceChoice, PRESETS, PosingError, Strategy, pose};
+use skinsplat_table::Table;
 
 const SECTION: &str = "scales";
 
@@ -35,18 +36,18 @@ pub(super) fn run() -> Result<Findings, PosingError> {
     let body = stage::body()?;
     let mut findings =
         Findings { section: SECTION, title: "Extreme scales and coefficients", ..Findings::default() };
-    let mut grid = Grid {
-        title: "Covariance factors: largest relative error of a column".to_owned(),
-        headings: std::iter::once("covariance").chain(FACTORS.iter().map(|f| f.0)).map(str::to_owned).collect(),
-        notes: vec![
+    let mut table = Table {
+        labels: vec![label("covariance")],
+        columns: FACTORS.iter().map(|f| column(f.0)).collect(),
+        remarks: vec![
             "Columns of the factor M, Σ = M Mᵀ, against those of ordinary scales times the same numbers: nothing is squared \
              before the renderer projects."
                 .to_owned(),
         ],
-        rows: Vec::new(),
+        ..Table::new("covariances", "Covariance factors: largest relative error of a column")
     };
     for covariance in CovarianceChoice::ALL {
-        let mut line = vec![covariance.to_string()];
+        let mut cells = Vec::new();
         for (name, factors) in FACTORS {
             // A disc has its own thickness, which no factor changes.
             let error = match covariance {
@@ -54,12 +55,12 @@ pub(super) fn run() -> Result<Findings, PosingError> {
                 _ => Some(factor_error(&body, covariance, factors)?),
             };
             let cell = error.map_or(Cell::Word("scales are its own"), Cell::number);
-            line.push(cell.to_string());
+            cells.push(cell.into());
             findings.rows.push(row("covariance", name, covariance.to_string(), "f32", cell, error));
         }
-        grid.rows.push(line);
+        table.rows.push(line([covariance.to_string()], cells));
     }
-    findings.grids.push(grid);
+    findings.tables.push(table);
     coefficients(&mut findings);
     findings.causes = vec![
         "Covariances stay factors until they are on the screen, so their condition is never squared; a scale or \
@@ -132,11 +133,11 @@ fn worse(a: f64, b: f64) -> f64 {
 
 /// Rotations of SH: sizes of coefficients and angles of rotations.
 fn coefficients(findings: &mut Findings) {
-    let mut grid = Grid {
-        title: "Rotated SH of degree 3: error over the size of the coefficients".to_owned(),
-        headings: ["precision", "rotation", "1e-12", "1", "1e4", "1e30"].map(str::to_owned).to_vec(),
-        notes: vec!["f32 against f64; f64 turned there and back against what it started from.".to_owned()],
-        rows: Vec::new(),
+    let mut table = Table {
+        labels: ["precision", "rotation"].map(label).into(),
+        columns: ["1e-12", "1", "1e4", "1e30"].map(column).into(),
+        remarks: vec!["f32 against f64; f64 turned there and back against what it started from.".to_owned()],
+        ..Table::new("coefficients", "Rotated SH of degree 3: error over the size of the coefficients")
     };
     let angles = [
         ("0", 0.0),
@@ -161,11 +162,11 @@ fn coefficients(findings: &mut Findings) {
                     Some(error),
                 ));
             }
-            let cells = errors.map(|e| Cell::number(e).to_string());
-            grid.rows.push([precision.to_owned(), name.to_owned()].into_iter().chain(cells).collect());
+            let cells = errors.map(|e| Cell::number(e).into());
+            table.rows.push(line([precision.to_owned(), name.to_owned()], cells.into()));
         }
     }
-    findings.grids.push(grid);
+    findings.tables.push(table);
 }
 
 fn sh_error(precision: &str, turn: Quaternion<f64>, size: f64) -> f64 {

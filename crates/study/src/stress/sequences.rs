@@ -2,7 +2,7 @@
 
 use super::exact::Exact;
 use super::stage::{self, PROBES};
-use super::table::{Cell, Findings, Grid, LIMITS, Row, Verdict, shown};
+use super::table::{Cell, Findings, LIMITS, Row, Verdict, column, label, line, shown};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use skinsplat_core::math::portable::{cos, sin};
@@ -10,6 +10,7 @@ use skinsplat_core::math::rotation::{angle_between, polar};
 use skinsplat_core::math::{Quaternion, dot4};
 use skinsplat_core::scene::{Pose, PosedBody, RestBody};
 use skinsplat_posing::{BoundAvatar, JointLift, PoseOptions, Poser, PosingError, RotationChoice, Strategy};
+use skinsplat_table::{self as table, Table};
 
 const SECTION: &str = "sequences";
 
@@ -235,7 +236,7 @@ pub(super) fn run(quick: bool) -> Result<Findings, PosingError> {
         section: SECTION,
         title: "Smooth sequences through degenerate poses",
         rows: rows.collect(),
-        grids: vec![jumps(&subjects, &courses, frames), remedy(&subjects, &courses)],
+        tables: vec![jumps(&subjects, &courses, frames), remedy(&subjects, &courses)],
         causes: causes(),
         ..Findings::default()
     })
@@ -260,37 +261,35 @@ fn row(subject: &Subject, sequence: &Sequence, course: &Course) -> Row {
     }
 }
 
-fn jumps(subjects: &[Subject], courses: &[Course], frames: usize) -> Grid {
-    let headings =
-        std::iter::once("rotation").chain(SEQUENCES.iter().map(|s| s.id)).map(str::to_owned).collect();
-    let cell = |course: &Course| match Verdict::of(course.left, LIMITS.jump_degrees) {
-        Verdict::Holds => format!("{}, continuous", shown(course.jump)),
-        _ => format!("{}, jumps by {} ({})", shown(course.jump), shown(course.left), course.probe),
+fn jumps(subjects: &[Subject], courses: &[Course], frames: usize) -> Table {
+    let cell = |course: &Course| {
+        let (jump, left) = (shown(course.jump), shown(course.left));
+        let words = match Verdict::of(course.left, LIMITS.jump_degrees) {
+            Verdict::Holds => format!("{jump}, continuous"),
+            _ => format!("{jump}, jumps by {left} ({})", course.probe),
+        };
+        table::Cell::phrase(course.jump, words)
     };
     let rows = subjects.iter().zip(courses.chunks(SEQUENCES.len()));
-    let mut notes: Vec<String> = SEQUENCES.iter().map(|s| format!("{}: {}", s.id, s.about)).collect();
-    notes.push(
-        "Six probes with different weights; the largest change of any. \"Jumps by\" is what remains when the frame is \
-         halved 24 times, and the probe that jumps."
-            .to_owned(),
-    );
-    Grid {
-        title: format!("Largest change per frame, degrees, {frames} frames"),
-        notes,
-        headings,
-        rows: rows
-            .map(|(subject, courses)| {
-                std::iter::once(subject.name()).chain(courses.iter().map(cell)).collect()
-            })
-            .collect(),
+    let row = |(subject, courses): (&Subject, &[Course])| {
+        line([subject.name()], courses.iter().map(cell).collect())
+    };
+    Table {
+        labels: vec![label("rotation")],
+        columns: SEQUENCES.iter().map(|s| column(s.id).about(s.about)).collect(),
+        rows: rows.map(row).collect(),
+        remarks: vec![
+            "Six probes with different weights; the largest change of any. \"Jumps by\" is what remains when the frame is \
+             halved 24 times, and the probe that jumps."
+                .to_owned(),
+        ],
+        ..Table::new("jumps", format!("Largest change per frame, degrees, {frames} frames"))
     }
 }
 
 /// The stock choice, the remedies, and what they cost.
-fn remedy(subjects: &[Subject], courses: &[Course]) -> Grid {
-    let headings = [
-        "sequence",
-        "rotation",
+fn remedy(subjects: &[Subject], courses: &[Course]) -> Table {
+    let columns = [
         "largest change per frame",
         "left as the step goes to 0",
         "off the average, median",
@@ -306,13 +305,16 @@ fn remedy(subjects: &[Subject], courses: &[Course]) -> Grid {
                 continue;
             }
             let course = &courses[k];
-            let numbers = [course.jump, course.left, course.deviation[0], course.deviation[1]].map(shown);
-            rows.push([sequence.id.to_owned(), subject.name()].into_iter().chain(numbers).collect());
+            let numbers = [course.jump, course.left, course.deviation[0], course.deviation[1]];
+            let cells = numbers.map(|value| Cell::number(value).into());
+            rows.push(line([sequence.id.to_owned(), subject.name()], cells.into()));
         }
     }
-    Grid {
-        title: "The remedy: signs that stay together, against the stock average, degrees".to_owned(),
-        notes: vec![
+    Table {
+        labels: ["sequence", "rotation"].map(label).into(),
+        columns: columns.map(column).into(),
+        rows,
+        remarks: vec![
             "Off the average: while the bones of a probe are within 120° of each other; the sum of quaternions weighs \
              unequal bones a little differently from Eq. 7."
                 .to_owned(),
@@ -320,8 +322,7 @@ fn remedy(subjects: &[Subject], courses: &[Course]) -> Grid {
              nearest to previous follows any motion, but its answer depends on the way there."
                 .to_owned(),
         ],
-        headings: headings.map(str::to_owned).to_vec(),
-        rows,
+        ..Table::new("remedy", "The remedy: signs that stay together, against the stock average, degrees")
     }
 }
 

@@ -1,7 +1,7 @@
 //! What was found, as data: one row per input, subject and precision, and where each subject breaks.
 
 use serde::{Serialize, Serializer};
-use skinsplat_core::math::portable;
+use skinsplat_table::{Column, Digits, Label, Table};
 use std::fmt;
 
 /// A measured value, or the word that says why there is none. Never NaN.
@@ -30,6 +30,16 @@ impl Cell {
     }
 }
 
+impl From<Cell> for skinsplat_table::Cell {
+    fn from(cell: Cell) -> Self {
+        match cell {
+            Cell::Number(value) => Self::number(value, DIGITS),
+            Cell::Flag(flag) => Self::flag(flag),
+            Cell::Word(word) => Self::text(word),
+        }
+    }
+}
+
 impl fmt::Display for Cell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -51,19 +61,36 @@ impl Serialize for Cell {
     }
 }
 
+/// With how many digits numbers are printed.
+const DIGITS: Digits = Digits::Shortest(3);
+
 /// Three digits, with an exponent where zeros would say nothing.
 pub(super) fn shown(value: f64) -> String {
-    let size = value.abs();
-    if value == 0.0 {
-        "0".to_owned()
-    } else if (1e-3..1e5).contains(&size) {
-        let digits = (2.0 - portable::log10(size).floor()).clamp(0.0, 5.0) as usize;
-        let text = format!("{value:.digits$}");
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-    } else {
-        let text = format!("{value:.2e}");
-        text.replace(".00e", "e")
-    }
+    DIGITS.show(value)
+}
+
+/// A column of measured values. Its keys are its headings.
+pub(super) fn column(title: impl Into<String>) -> Column {
+    let title = title.into();
+    Column::new(title.clone(), title).digits(DIGITS)
+}
+
+/// A column of words.
+pub(super) fn words(title: &str) -> Column {
+    Column::text(title, title)
+}
+
+/// A leading column, under its heading.
+pub(super) fn label(title: &str) -> Label {
+    Label::new(title, title)
+}
+
+/// A row that is named by its labels.
+pub(super) fn line<const N: usize>(
+    labels: [String; N],
+    cells: Vec<skinsplat_table::Cell>,
+) -> skinsplat_table::Row {
+    skinsplat_table::Row::new(labels.join("/"), labels, cells)
 }
 
 /// An input, with every digit that it has.
@@ -176,17 +203,11 @@ pub struct Threshold {
     pub axis: String,
 }
 
-/// A table for people: headings and rows of text.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Grid {
-    /// Above the table.
-    pub title: String,
-    /// Below it, sentence by sentence.
-    pub notes: Vec<String>,
-    /// Column headings.
-    pub headings: Vec<String>,
-    /// Cells.
-    pub rows: Vec<Vec<String>>,
+impl Threshold {
+    /// `breaks at 133`.
+    pub(super) fn cell(&self) -> skinsplat_table::Cell {
+        skinsplat_table::Cell::phrase(self.breaks_at, format!("breaks at {}", shown(self.breaks_at)))
+    }
 }
 
 /// What one section found.
@@ -197,7 +218,7 @@ pub struct Findings {
     /// A heading.
     pub title: &'static str,
     /// Summaries.
-    pub grids: Vec<Grid>,
+    pub tables: Vec<Table>,
     /// Everything that was measured.
     pub rows: Vec<Row>,
     /// Where subjects break.
@@ -234,17 +255,8 @@ mod tests {
 
     #[test]
     fn numbers_are_short_and_never_nan() {
-        for (value, text) in [
-            (0.0, "0"),
-            (1.0, "1"),
-            (0.5, "0.5"),
-            (123.456, "123"),
-            (1e-9, "1e-9"),
-            (12345.0, "12345"),
-            (0.00123, "0.00123"),
-        ] {
-            assert_eq!(shown(value), text);
-        }
+        assert_eq!(shown(0.00123), "0.00123");
+        assert_eq!(Cell::number(1e-9).to_string(), "1e-9");
         assert_eq!(Cell::number(f64::NAN), Cell::Word("not finite"));
     }
 

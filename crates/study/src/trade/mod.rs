@@ -29,12 +29,14 @@ pub use page::{csv, json, markdown};
 pub use pareto::pareto_front;
 pub use picture::scatter;
 pub use recommend::{Pick, Recommendation, recommend};
-pub use section::{Cell, Column, Outcome, Row, Section, Sweep, SweepRow, Unit};
+pub use section::{Outcome, Sweep, SweepRow, Unit};
 pub use stage::{Options, Stage};
 pub use sweep::{SWEEPS, measure};
 
+use skinsplat_table::Table;
+
 /// Version of the JSON schema.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// The result: where it was measured, the sweeps, sections that other modules add, and what follows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -46,7 +48,7 @@ pub struct Trade {
     /// What the numbers come from. Sentences without full stops.
     pub ran_on: Vec<String>,
     /// The tables, in reading order.
-    pub sections: Vec<Section>,
+    pub sections: Vec<Table>,
     /// One per use.
     pub recommendations: Vec<Recommendation>,
 }

@@ -1,8 +1,7 @@
 //! Sweeps as data, and the tables that are made of them.
 
 use super::{Degrees, Fidelity, Spread, pareto_front};
-use serde::Serialize;
-use skinsplat_core::math::portable;
+use skinsplat_table::{Cell, Column, Digits, Label, Row, Table};
 
 /// Errors below this, degrees, count as equal: quaternions are drawn from f32, which holds no more.
 pub(super) const EQUAL_BELOW: f64 = 1e-5;
@@ -141,164 +140,126 @@ impl Sweep {
     }
 
     /// The table.
-    pub fn section(&self) -> Section {
-        let (times, bytes) = (self.has(|o| o.time.is_some()), self.has(|o| o.bytes.is_some()));
-        let (degrees, fidelity) = (self.has(|o| o.degrees.is_some()), self.has(|o| o.fidelity.is_some()));
-        let column = |id: &str, title: &str, timing| Column { id: id.into(), title: title.into(), timing };
-        let mut columns = vec![column("motion", "Motion", false)];
-        columns.extend(self.axes.iter().map(|axis| column(&axis.to_lowercase(), axis, false)));
-        if times {
-            columns.push(column("time", self.unit.title(), true));
-            columns.push(column("time_low", "1st quartile", true));
-            columns.push(column("time_high", "3rd quartile", true));
+    pub fn section(&self) -> Table {
+        let measured = Measured::of(self);
+        let mut table = Table::new(self.id, self.title);
+        // A sentence of a table has no full stop.
+        table.sentences = vec![self.about.trim_end_matches('.').to_owned()];
+        table.labels = vec![Label::new("motion", "Motion")];
+        table.labels.extend(self.axes.iter().map(|axis| Label::new(axis.to_lowercase(), *axis)));
+        table.columns = measured.columns(self);
+        table.rows =
+            self.rows.iter().zip(self.front()).map(|(row, front)| measured.row(self, row, front)).collect();
+        table
+    }
+
+    /// Where a row stands: `front`, `beaten`, or why it is not judged.
+    fn standing(&self, row: &SweepRow, on_front: bool) -> &'static str {
+        match (&row.outcome, self.criteria(row)) {
+            (Err(_), _) => "not run",
+            (Ok(_), None) => "not judged",
+            (Ok(_), Some(_)) if on_front => "front",
+            (Ok(_), Some(_)) => "beaten",
         }
-        if bytes {
-            columns.push(column("bytes", "bytes per Gaussian", false));
+    }
+}
+
+/// Which measurements a sweep has: those that any of its rows has.
+struct Measured {
+    times: bool,
+    bytes: bool,
+    degrees: bool,
+    fidelity: bool,
+}
+
+impl Measured {
+    fn of(sweep: &Sweep) -> Self {
+        Self {
+            times: sweep.has(|o| o.time.is_some()),
+            bytes: sweep.has(|o| o.bytes.is_some()),
+            degrees: sweep.has(|o| o.degrees.is_some()),
+            fidelity: sweep.has(|o| o.fidelity.is_some()),
         }
-        if degrees {
-            columns.push(column("degrees_median", "median °", false));
-            columns.push(column("degrees_p95", "95 % °", false));
-            columns.push(column("degrees_max", "max °", false));
+    }
+
+    fn columns(&self, sweep: &Sweep) -> Vec<Column> {
+        let number = |key: &str, title: &str| Column::new(key, title).digits(DIGITS);
+        let mut columns = Vec::new();
+        if self.times {
+            columns.push(number("time", sweep.unit.title()).timing());
+            columns.push(number("time_low", "1st quartile").timing());
+            columns.push(number("time_high", "3rd quartile").timing());
         }
-        if fidelity {
-            columns.push(column("psnr", "PSNR dB", false));
+        if self.bytes {
+            columns.push(number("bytes", "bytes per Gaussian"));
         }
-        columns.push(column("front", "Front", !self.by_bytes));
-        columns.push(column("note", "Note", false));
-        let row = |(row, on_front): (&SweepRow, bool)| {
-            let mut cells = vec![Cell::text(row.motion)];
-            cells.extend(row.choice.iter().map(|choice| Cell::text(choice)));
-            let none = Outcome::default();
-            let (outcome, why) = match &row.outcome {
-                Ok(outcome) => (outcome, "not measured"),
-                Err(_) => (&none, "not run"),
-            };
-            let number = |value: Option<f64>| value.map_or_else(|| Cell::Word(why.to_owned()), Cell::number);
-            if times {
-                let time =
-                    |part: fn(Spread) -> f64| number(outcome.time.map(|t| part(t) * self.unit.factor()));
-                cells.extend([time(|t| t.median), time(|t| t.low), time(|t| t.high)]);
-            }
-            if bytes {
-                cells.push(number(outcome.bytes));
-            }
-            if degrees {
-                let angle = |part: fn(Degrees) -> f64| number(outcome.degrees.map(part));
-                cells.extend([angle(|d| d.median), angle(|d| d.p95), angle(|d| d.max)]);
-            }
-            if fidelity {
-                cells.push(match outcome.fidelity {
-                    Some(Fidelity::Exact) => Cell::Word("exact".to_owned()),
-                    Some(Fidelity::Decibels(value)) => Cell::number(value),
-                    None => number(None),
-                });
-            }
-            cells.push(Cell::text(match (&row.outcome, self.criteria(row)) {
-                (Err(_), _) => "not run",
-                (Ok(_), None) => "not judged",
-                (Ok(_), Some(_)) if on_front => "front",
-                (Ok(_), Some(_)) => "beaten",
-            }));
-            let note = match &row.outcome {
-                Err(problem) => problem,
-                Ok(_) if row.note.is_empty() => "none",
-                Ok(_) => &row.note,
-            };
-            cells.push(Cell::text(note));
-            Row { id: self.row_id(row), cells }
+        if self.degrees {
+            columns.push(number("degrees_median", "median °"));
+            columns.push(number("degrees_p95", "95 % °"));
+            columns.push(number("degrees_max", "max °"));
+        }
+        if self.fidelity {
+            columns.push(number("psnr", "PSNR dB"));
+        }
+        let front = Column::text("front", "Front");
+        columns.push(if sweep.by_bytes { front } else { front.timing() });
+        columns.push(Column::text("note", "Note"));
+        columns
+    }
+
+    fn row(&self, sweep: &Sweep, row: &SweepRow, on_front: bool) -> Row {
+        let (none, mut cells) = (Outcome::default(), Vec::new());
+        let (outcome, why) = match &row.outcome {
+            Ok(outcome) => (outcome, "not measured"),
+            Err(_) => (&none, "not run"),
         };
-        Section {
-            id: self.id.to_owned(),
-            title: self.title.to_owned(),
-            about: self.about.clone(),
-            columns,
-            rows: self.rows.iter().zip(self.front()).map(row).collect(),
+        let number = |value: Option<f64>| value.map_or_else(|| Cell::text(why), cell);
+        if self.times {
+            let time = |part: fn(Spread) -> f64| number(outcome.time.map(|t| part(t) * sweep.unit.factor()));
+            cells.extend([time(|t| t.median), time(|t| t.low), time(|t| t.high)]);
         }
+        if self.bytes {
+            cells.push(number(outcome.bytes));
+        }
+        if self.degrees {
+            let angle = |part: fn(Degrees) -> f64| number(outcome.degrees.map(part));
+            cells.extend([angle(|d| d.median), angle(|d| d.p95), angle(|d| d.max)]);
+        }
+        if self.fidelity {
+            cells.push(match outcome.fidelity {
+                Some(Fidelity::Exact) => Cell::text("exact"),
+                Some(Fidelity::Decibels(value)) => cell(value),
+                None => number(None),
+            });
+        }
+        cells.push(Cell::text(sweep.standing(row, on_front)));
+        cells.push(Cell::text(match &row.outcome {
+            Err(problem) => problem,
+            Ok(_) if row.note.is_empty() => "none",
+            Ok(_) => &row.note,
+        }));
+        let labels = [row.motion].into_iter().chain(row.choice.iter().map(String::as_str));
+        Row::new(sweep.row_id(row), labels, cells)
     }
 }
 
-/// A table of any shape.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Section {
-    /// Id, unique in a result.
-    pub id: String,
-    /// Heading.
-    pub title: String,
-    /// What is compared with what. Sentences.
-    pub about: String,
-    /// The columns.
-    pub columns: Vec<Column>,
-    /// The rows.
-    pub rows: Vec<Row>,
-}
+/// With how many digits numbers are printed.
+const DIGITS: Digits = Digits::Significant(3);
 
-/// A column.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Column {
-    /// Id, unique in its section.
-    pub id: String,
-    /// Heading.
-    pub title: String,
-    /// True if values depend on a clock: all others are the same from run to run.
-    pub timing: bool,
-}
-
-/// A row.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
-    /// Unique in a result; evidence is cited by it.
-    pub id: String,
-    /// One per column.
-    pub cells: Vec<Cell>,
-}
-
-/// A cell: a finite number or a word, never nothing.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum Cell {
-    /// A number.
-    Number(f64),
-    /// A name, or why there is no number.
-    Word(String),
-}
-
-impl Cell {
-    /// A number, or what stands for one that is not finite.
-    pub fn number(value: f64) -> Self {
-        if value.is_nan() {
-            Self::Word("undefined".to_owned())
-        } else if value.is_infinite() {
-            Self::Word("unbounded".to_owned())
-        } else {
-            Self::Number(value)
-        }
-    }
-
-    /// A word.
-    pub fn text(text: &str) -> Self {
-        Self::Word(text.to_owned())
-    }
-
-    /// As people read it: three significant digits, whole numbers from 1000 on.
-    pub fn shown(&self) -> String {
-        match self {
-            Self::Word(word) => word.clone(),
-            Self::Number(value) => shown(*value),
-        }
+/// A number, or what stands for one that is not finite.
+pub(super) fn cell(value: f64) -> Cell {
+    if value.is_nan() {
+        Cell::text("undefined")
+    } else if value.is_infinite() {
+        Cell::text("unbounded")
+    } else {
+        Cell::number(value, DIGITS)
     }
 }
 
 /// Three significant digits.
 pub(super) fn shown(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 {
-        "0".to_owned()
-    } else if size < 1e-3 {
-        format!("{value:.1e}")
-    } else {
-        let digits = (2.0 - portable::log10(size).floor()).clamp(0.0, 5.0) as usize;
-        format!("{value:.digits$}")
-    }
+    DIGITS.show(value)
 }
 
 #[cfg(test)]
@@ -346,9 +307,9 @@ mod tests {
     #[test]
     fn a_table_has_a_word_or_a_number_in_every_cell() {
         let section = sweep().section();
+        section.check().expect("a sound table");
         for row in &section.rows {
-            assert_eq!(row.cells.len(), section.columns.len());
-            assert!(row.cells.iter().all(|cell| !cell.shown().is_empty()));
+            assert!(row.cells.iter().all(|cell| !cell.text.is_empty()));
         }
         let last = &section.rows[4];
         assert_eq!(last.id, "solver/extreme/faces");
@@ -357,12 +318,9 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_shown_with_three_digits() {
-        let cases =
-            [(0.0, "0"), (1234.5, "1234"), (12.345, "12.3"), (0.012345, "0.0123"), (1.2e-5, "1.2e-5")];
-        for (value, text) in cases {
-            assert_eq!(shown(value), text);
-        }
-        assert_eq!(Cell::number(f64::NAN), Cell::text("undefined"));
+    fn what_is_no_number_has_a_word() {
+        assert_eq!(cell(f64::NAN), Cell::text("undefined"));
+        assert_eq!(cell(f64::INFINITY), Cell::text("unbounded"));
+        assert_eq!(cell(12.345).text, "12.3");
     }
 }

@@ -1,50 +1,45 @@
 //! The savings as a section of the report.
 
 use super::{Same, Saving};
-use crate::trade::{Cell, Column, Row, Section};
+use crate::trade::section::cell;
+use skinsplat_table::{Cell, Column, Label, Row, Table};
 
 /// Id of the section.
 pub const ID: &str = "savings";
 
 /// A row per saving, in milliseconds.
-pub fn section(savings: &[Saving]) -> Section {
-    let column =
-        |id: &str, title: &str, timing| Column { id: id.to_owned(), title: title.to_owned(), timing };
-    let row = |(i, saving): (usize, &Saving)| {
-        let milliseconds = |seconds: f64| Cell::number(1e3 * seconds);
-        Row {
-            id: format!("{ID}/{}", i + 1),
-            cells: vec![
-                Cell::text(&saving.what),
-                Cell::text(saving.unit),
-                milliseconds(saving.without.median),
-                milliseconds(saving.without.high - saving.without.low),
-                milliseconds(saving.with.median),
-                milliseconds(saving.with.high - saving.with.low),
-                Cell::number(saving.factor()),
-                Cell::text(&saving.result.to_string()),
-                Cell::text(if matches!(saving.result, Same::Different { .. }) { "no" } else { "yes" }),
-            ],
-        }
-    };
-    Section {
-        id: ID.to_owned(),
-        title: "Only what a scene requires".to_owned(),
-        about: "What is left out where it is not needed, on a built-in subject: the cost of doing it all, the cost of doing \
-                what is needed (medians of repeated runs in turns, one thread, with the distance between quartiles), and what \
-                becomes of the result."
+pub fn section(savings: &[Saving]) -> Table {
+    let mut table = Table::new(ID, "Only what a scene requires");
+    table.sentences = vec![
+        "What is left out where it is not needed, on a built-in subject: the cost of doing it all, the cost of doing what is \
+         needed (medians of repeated runs in turns, one thread, with the distance between quartiles), and what becomes of \
+         the result"
             .to_owned(),
-        columns: vec![
-            column("what", "Left out", false),
-            column("unit", "Time of", false),
-            column("without", "All, ms", true),
-            column("without-spread", "± quartiles", true),
-            column("with", "Needed, ms", true),
-            column("with-spread", "± quartiles", true),
-            column("factor", "Times faster", true),
-            column("result", "Result", false),
-            column("holds", "As claimed", false),
-        ],
-        rows: savings.iter().enumerate().map(row).collect(),
-    }
+    ];
+    table.labels = vec![Label::new("what", "Left out"), Label::new("unit", "Time of")];
+    table.columns = vec![
+        Column::new("without", "All, ms").timing(),
+        Column::new("without-spread", "± quartiles").timing(),
+        Column::new("with", "Needed, ms").timing(),
+        Column::new("with-spread", "± quartiles").timing(),
+        Column::new("factor", "Times faster").timing(),
+        Column::text("result", "Result"),
+        Column::text("holds", "As claimed"),
+    ];
+    table.rows = savings.iter().enumerate().map(row).collect();
+    table
+}
+
+fn row((i, saving): (usize, &Saving)) -> Row {
+    let milliseconds = |seconds: f64| cell(1e3 * seconds);
+    let cells = vec![
+        milliseconds(saving.without.median),
+        milliseconds(saving.without.high - saving.without.low),
+        milliseconds(saving.with.median),
+        milliseconds(saving.with.high - saving.with.low),
+        cell(saving.factor()),
+        Cell::text(saving.result.to_string()),
+        Cell::text(if matches!(saving.result, Same::Different { .. }) { "no" } else { "yes" }),
+    ];
+    Row::new(format!("{ID}/{}", i + 1), [saving.what.as_str(), saving.unit], cells)
 }

@@ -1,31 +1,22 @@
 //! A table as LaTeX, for papers: needs `\usepackage{booktabs}`.
 
-use super::table::{Cell, Table, TableColumn};
+use super::escape::{Span, minus, spans, visible};
+use super::{Align, Cell, Column, Content, Table};
 
-/// A `table` environment with caption, label `tab:ID`, and footnotes under the grid.
+/// A `table` environment with the sentences as its caption, label `tab:ID`, and footnotes under the grid.
 pub fn latex(table: &Table) -> String {
-    let spec = "l".repeat(table.labels.len()) + &"r".repeat(table.columns.len());
+    let aligns =
+        table.labels.iter().map(|_| Align::Left).chain(table.columns.iter().map(|column| column.align));
+    let spec: String = aligns.map(|align| if align == Align::Left { 'l' } else { 'r' }).collect();
+    let sentences: Vec<String> = table.sentences.iter().map(|sentence| prose(sentence) + ".").collect();
     let mut text = String::from("\\begin{table}\n\\centering\n");
-    let sentences: Vec<String> =
-        [&table.caption].into_iter().chain(&table.ran_on).map(|s| escape(s) + ".").collect();
-    text += &format!("\\caption{{{}}}\n\\label{{tab:{}}}\n", sentences.join(" "), table.id);
+    text += &format!("\\caption{{{}}}\n\\label{{tab:{}}}\n", sentences.join(" "), visible(&table.id));
     text += &format!("\\begin{{tabular}}{{{spec}}}\n\\toprule\n");
     text += &group_headings(table);
-    let labels = table.labels.iter().map(|label| escape(label));
+    let labels = table.labels.iter().map(|label| escape(&label.title));
     let headings: Vec<String> = labels.chain(table.columns.iter().map(|c| escape(&c.heading()))).collect();
     text += &line(&headings);
-    let mut above: Option<&str> = None;
-    for row in &table.rows {
-        let mut labels: Vec<String> = row.labels.iter().map(|label| escape(label)).collect();
-        let repeated = row.labels.len() > 1 && above == Some(row.labels[0].as_str());
-        if repeated {
-            labels[0].clear();
-        } else if row.labels.len() > 1 || above.is_none() {
-            text += "\\midrule\n";
-        }
-        above = Some(&row.labels[0]);
-        text += &line(&labels.into_iter().chain(row.cells.iter().map(cell)).collect::<Vec<_>>());
-    }
+    text += &rows(table);
     text += "\\bottomrule\n\\end{tabular}\n";
     for (number, note) in (1..).zip(&table.notes) {
         text += &format!("\\\\ {{\\footnotesize $^{{{number}}}$ {}}}\n", escape(note));
@@ -33,15 +24,34 @@ pub fn latex(table: &Table) -> String {
     text + "\\end{table}\n"
 }
 
-/// The line over grouped columns.
+/// The rows, with a rule above each group that shares its first label.
+fn rows(table: &Table) -> String {
+    let grouped = table.labels.len() > 1 && table.labels[0].once;
+    let mut text = String::new();
+    for (r, (row, repeats)) in table.rows.iter().zip(table.repeats()).enumerate() {
+        let mut labels: Vec<String> = row.labels.iter().map(|label| escape(label)).collect();
+        if repeats {
+            labels[0].clear();
+        } else if grouped || r == 0 {
+            text += "\\midrule\n";
+        }
+        text += &line(&labels.into_iter().chain(row.cells.iter().map(cell)).collect::<Vec<_>>());
+    }
+    text
+}
+
+/// The line over grouped columns; none if a column has no group.
 fn group_headings(table: &Table) -> String {
     let mut groups: Vec<(&str, usize)> = Vec::new();
-    for TableColumn { group, .. } in &table.columns {
+    for Column { group, .. } in &table.columns {
         let Some(group) = group else { return String::new() };
         match groups.last_mut() {
             Some((last, span)) if last == group => *span += 1,
             _ => groups.push((group, 1)),
         }
+    }
+    if groups.is_empty() {
+        return String::new();
     }
     let blank = table.labels.iter().map(|_| String::new());
     let spans = groups.iter().map(|(group, n)| format!("\\multicolumn{{{n}}}{{c}}{{{}}}", escape(group)));
@@ -55,7 +65,10 @@ fn group_headings(table: &Table) -> String {
 }
 
 fn cell(cell: &Cell) -> String {
-    let text = escape(&cell.text.replace('-', "−"));
+    let text = match cell.content {
+        Content::Text | Content::Flag(_) => escape(&cell.text),
+        _ => escape(&minus(&cell.text)),
+    };
     let text = if cell.best { format!("\\textbf{{{text}}}") } else { text };
     match cell.footnotes() {
         None => text,
@@ -67,8 +80,18 @@ fn line(cells: &[String]) -> String {
     format!("{} \\\\\n", cells.join(" & "))
 }
 
+/// A sentence: what is between a pair of backticks is code.
+fn prose(text: &str) -> String {
+    let part = |span: &Span<'_>| match span {
+        Span::Words(words) => escape(words),
+        Span::Code(code) => format!("\\texttt{{{}}}", escape(code)),
+    };
+    spans(text).iter().map(part).collect()
+}
+
 /// Text that LaTeX shows as it is.
 fn escape(text: &str) -> String {
+    let text = visible(text);
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -83,7 +106,6 @@ fn escape(text: &str) -> String {
             '∞' => escaped += "$\\infty$",
             '−' => escaped += "$-$",
             '—' => escaped += "---",
-            '\n' | '\r' => escaped.push(' '),
             c => escaped.push(c),
         }
     }
@@ -97,5 +119,6 @@ mod tests {
     #[test]
     fn names_cannot_break_the_document() {
         assert_eq!(escape("a_b & 50 % \\x{}"), "a\\_b \\& 50 \\% \\textbackslash{}x\\{\\}");
+        assert_eq!(prose("`a_b` & c"), "\\texttt{a\\_b} \\& c");
     }
 }
