@@ -56,9 +56,7 @@ impl Desk {
         let mut command = Command::new(env!("CARGO_BIN_EXE_reproduce"));
         command.args(arguments).current_dir(self.folder.path()).stdin(Stdio::null());
         // Batch systems and terminals must not change what a test sees.
-        for name in
-            ["SLURM_CPUS_PER_TASK", "COLUMNS", "RUST_BACKTRACE", "REPRODUCE_LPIPS_WEIGHTS"]
-        {
+        for name in ["SLURM_CPUS_PER_TASK", "COLUMNS", "RUST_BACKTRACE", "REPRODUCE_LPIPS_WEIGHTS"] {
             command.env_remove(name);
         }
         command
