@@ -16,7 +16,7 @@ pub(super) trait Layer: Copy + Sync {
     /// Its part in one block.
     type Block: LayerBlock;
 
-    /// In the block whose first pixel is (`left`, `top`).
+    /// In the block whose first pixel is `corner`.
     fn block(self, corner: [usize; 2]) -> Self::Block;
 }
 
