@@ -50,7 +50,7 @@ fn unsigned_zero(text: String) -> String {
 /// Digits after the point that make so many significant ones; at most two more than that.
 fn decimals(size: f64, digits: usize) -> usize {
     let digits = digits as f64;
-    (digits - 1.0 - size.log10().floor()).clamp(0.0, digits + 2.0) as usize
+    (digits - 1.0 - libm::log10(size).floor()).clamp(0.0, digits + 2.0) as usize
 }
 
 fn significant(value: f64, digits: usize) -> String {

@@ -1,6 +1,7 @@
 //! What was found, as data: one row per input, subject and precision, and where each subject breaks.
 
 use serde::{Serialize, Serializer};
+use skinsplat_core::math::portable;
 use skinsplat_table::{Column, Digits, Label, Table};
 use std::fmt;
 
