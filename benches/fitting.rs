@@ -17,7 +17,8 @@ fn steps(c: &mut Criterion) {
             let recipe = Recipe::parse(recipe).unwrap();
             let degree = recipe.sh_degree;
             let options = FitOptions { recipe, iterations: u32::MAX, seed: 0, edge_mm };
-            let mut trainer = Trainer::new(training, &options, start(training, &options).unwrap()).unwrap();
+            let mut trainer =
+                Trainer::new(training, &options, start(training, &options).unwrap().avatar).unwrap();
             // Every frame is decoded once before the clock runs.
             for _ in 0..training.frames.len() {
                 trainer.step().unwrap();

@@ -240,6 +240,22 @@ fn what_is_wrong_with_a_registry_is_named() {
         (good.replace("licence = \"CC0-1.0\"\n", ""), "line 1", "licence"),
         (format!("{good}{good}"), "dataset[1].id", "again"),
         (format!("{good}subjects = [\"../b\"]\n"), "dataset[0].subjects", "path"),
+        (format!("{good}subjects = [\"..\"]\n"), "dataset[0].subjects", "path"),
+        (format!("{good}subjects = [\".\"]\n"), "dataset[0].subjects", "path"),
+        (format!("{good}subjects = [\"/\"]\n"), "dataset[0].subjects", "path"),
+        (format!("{good}subjects = [\"\"]\n"), "dataset[0].subjects", "path"),
+        (format!("{good}subjects = [\"b/\"]\n"), "dataset[0].subjects", "path"),
+        (format!("{good}[dataset.folders]\nb = \"..\"\n"), "dataset[0].subjects", "path"),
+        (
+            format!("{good}[[dataset.avatars]]\nname = \"h\"\npath = \"h.ply\"\nfile = \"x\"\n"),
+            "line 12",
+            "file",
+        ),
+        (
+            format!("{good}{}", "[[dataset.avatars]]\nname = \"h\"\npath = \"h.ply\"\n".repeat(2)),
+            "dataset[0].avatars",
+            "repeat",
+        ),
         ("[[dataset]".into(), "line 1", ""),
     ];
     for (text, field, word) in cases {

@@ -5,7 +5,7 @@
 mod program;
 mod support;
 
-use program::{Answer, Desk, contents};
+use program::{Answer, Desk, contents, copy};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -69,7 +69,7 @@ fn a_second_run_renders_nothing_and_changes_nothing() {
     let first = run(&desk, "run", &[]);
     assert_eq!(rendered(&desk, "run"), 6);
     let names: Vec<String> = products(&desk, "run").into_iter().map(|file| file.0).collect();
-    assert_eq!(names.len(), 5, "{names:?}");
+    assert_eq!(names.len(), 6, "{names:?}");
     for name in ["results.json", "tables.md", "tiny.csv", "tiny.tex"] {
         assert!(names.iter().any(|n| n == name), "{name} in {names:?}");
     }
@@ -173,19 +173,6 @@ fn other_settings_redo_only_what_they_change() {
     run(&desk, "run", &["--limit", "1"]);
     assert_eq!(rendered(&desk, "run"), 2);
     assert!(desk.read("run/tables.md").contains("Protocol: hugs-full, version 1."));
-}
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        let target = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            std::fs::copy(entry.path(), target).unwrap();
-        }
-    }
 }
 
 #[test]

@@ -31,7 +31,7 @@ fn options(recipe: &str, iterations: u32) -> FitOptions {
 }
 
 fn fitted(sequence: &Sequence, options: &FitOptions) -> Avatar {
-    let mut trainer = Trainer::new(sequence, options, start(sequence, options).unwrap()).unwrap();
+    let mut trainer = Trainer::new(sequence, options, start(sequence, options).unwrap().avatar).unwrap();
     while !trainer.is_done() {
         trainer.step().unwrap();
     }
@@ -46,7 +46,7 @@ fn every_recipe_improves_on_its_start_on_held_out_poses() {
     for recipe in RECIPES.iter().filter(|recipe| recipe.id != "pure-skinned") {
         let options = options(&recipe.id, 60);
         let strategy = recipe.strategy.parse().unwrap();
-        let first = start(&training, &options).unwrap();
+        let first = start(&training, &options).unwrap().avatar;
         let mut trainer = Trainer::new(&training, &options, first.clone()).unwrap();
         let before = held_out(trainer.fitted(), &strategy, &test, 0, true).unwrap().remove(0);
         while !trainer.is_done() {
@@ -67,7 +67,7 @@ fn an_interrupted_fit_ends_in_the_same_bits_on_any_number_of_threads() {
     let training = small(&subject().train[0], 4);
     for recipe in ["hugs-original", "splattingavatar-skinned", "ihuman-original", "haha"] {
         let options = options(recipe, 56);
-        let first = start(&training, &options).unwrap();
+        let first = start(&training, &options).unwrap().avatar;
         let mut trainer = Trainer::new(&training, &options, first.clone()).unwrap();
         while !trainer.is_done() {
             trainer.step().unwrap();
@@ -80,7 +80,7 @@ fn an_interrupted_fit_ends_in_the_same_bits_on_any_number_of_threads() {
                 trainer.step().unwrap();
             }
             assert!(trainer.is_resting());
-            let bytes = postcard::to_stdvec(&trainer.checkpoint()).unwrap();
+            let bytes = postcard::to_stdvec(&trainer.checkpoint().unwrap()).unwrap();
             let checkpoint = postcard::from_bytes(&bytes).unwrap();
             let mut trainer = Trainer::resume(&training, &options, checkpoint).unwrap();
             while !trainer.is_done() {
@@ -100,7 +100,7 @@ fn gaussians_of_a_hybrid_stay_where_the_mesh_falls_short() {
     let training = small(&subject().train[0], 3);
     let recipe = "haha+loss.opacity=0.01+start.inset=0.0+rates.position=1e-3+rates.scale=1e-2";
     let options = options(recipe, 150);
-    let first = start(&training, &options).unwrap();
+    let first = start(&training, &options).unwrap().avatar;
     let survivors = |sequence: &Sequence| {
         let mut trainer = Trainer::new(sequence, &options, first.clone()).unwrap();
         while !trainer.is_done() {
@@ -124,9 +124,18 @@ fn gaussians_of_a_hybrid_stay_where_the_mesh_falls_short() {
 fn a_checkpoint_of_another_fit_is_refused() {
     let training = small(&subject().train[0], 2);
     let (mine, other) = (options("animatable-skinned", 10), options("animatable-skinned", 11));
-    let trainer = Trainer::new(&training, &mine, start(&training, &mine).unwrap()).unwrap();
-    let error = Trainer::resume(&training, &other, trainer.checkpoint()).err().unwrap();
-    assert!(error.to_string().contains("another fit"), "{error}");
+    let trainer = Trainer::new(&training, &mine, start(&training, &mine).unwrap().avatar).unwrap();
+    let refused = |sequence: &Sequence, options: &FitOptions| {
+        let error = Trainer::resume(sequence, options, trainer.checkpoint().unwrap()).err().unwrap();
+        assert!(error.to_string().contains("another fit"), "{error}");
+    };
+    refused(&training, &other);
+    // The same names and sizes, other poses and images.
+    let mut poses = training.poses.to_vec();
+    poses[training.frames[0].pose].translation.x += 1e-3;
+    refused(&Sequence { poses: poses.into(), ..training.clone() }, &mine);
+    refused(&broken(&training, |_, truth| emptied(truth)), &mine);
+    assert!(Trainer::resume(&training, &mine, trainer.checkpoint().unwrap()).is_ok());
 }
 
 #[test]
@@ -135,7 +144,7 @@ fn only_what_is_free_changes() {
     let fixed =
         "animatable-skinned+free.position=fixed+free.rotation=fixed+free.scale=fixed+free.opacity=false";
     let options = options(fixed, 5);
-    let first = start(&training, &options).unwrap();
+    let first = start(&training, &options).unwrap().avatar;
     let after = fitted(&training, &options);
     assert_eq!(first.gaussians.means, after.gaussians.means);
     assert_eq!(first.gaussians.rotations, after.gaussians.rotations);
@@ -162,7 +171,7 @@ fn splitting_and_walking_change_the_number_and_keep_the_binding() {
     let training = small(&subject().train[0], 4);
     let recipe = "splattingavatar-skinned+densify.gradient=1e-7+densify.split_above=0.02+densify.most=1.5";
     let options = options(recipe, 30);
-    let first = start(&training, &options).unwrap();
+    let first = start(&training, &options).unwrap().avatar;
     let after = fitted(&training, &options);
     assert!(after.gaussians.len() > first.gaussians.len());
     assert!(after.gaussians.len() <= first.gaussians.len() * 3 / 2);
@@ -207,7 +216,7 @@ fn emptied(truth: &mut Truth) {
 fn useless_frames_are_passed_over_with_a_warning_and_refused_if_there_is_no_other() {
     let training = small(&subject().train[0], 3);
     let options = options("animatable-skinned", 6);
-    let first = start(&training, &options).unwrap();
+    let first = start(&training, &options).unwrap().avatar;
     let one = broken(&training, |i, truth| {
         if i == 1 {
             emptied(truth);
@@ -242,7 +251,7 @@ fn useless_frames_are_passed_over_with_a_warning_and_refused_if_there_is_no_othe
 fn numbers_that_are_not_finite_stop_a_fit_by_name() {
     let training = small(&subject().train[0], 2);
     let options = options("animatable-skinned", 6);
-    let first = start(&training, &options).unwrap();
+    let first = start(&training, &options).unwrap().avatar;
     let nan = broken(&training, |_, truth| {
         let (width, height) = (truth.rgb.width(), truth.rgb.height());
         truth.rgb = Image::filled(width, height, [f32::NAN; 3]);

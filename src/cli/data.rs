@@ -1,12 +1,17 @@
 //! Which data a command looks at.
 
 use crate::datasets::{Dataset, Registry};
-use crate::experiment::Experiment;
-use crate::run::{Library, LoadedDataset};
+use crate::experiment::{AvatarRecipe, Experiment};
+use crate::run::{Library, LoadedDataset, RegisteredAvatar};
 use anyhow::{Result, bail};
 use skinsplat_data::Subject;
 use skinsplat_data::folder::Options;
 use std::path::{Path, PathBuf};
+
+/// The registry of a folder.
+const LOCAL: &str = "datasets.toml";
+/// The environment variable that names a registry.
+const VARIABLE: &str = "REPRODUCE_DATASETS";
 
 /// Where data comes from.
 #[derive(Debug, clap::Args)]
@@ -15,7 +20,8 @@ pub(super) struct Data {
     /// Run on the subjects of this folder: a subject, a folder of subjects, or a folder with datasets/ in it
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Registry of datasets [default: datasets.toml in this folder if there is one, else the built-in registry]
+    /// Registry of datasets [default: the file that REPRODUCE_DATASETS names, else datasets.toml in this folder, else the
+    /// built-in registry]
     #[arg(long, value_name = "FILE", conflicts_with = "data")]
     datasets: Option<PathBuf>,
     /// Displace bodies by the clothing that a subject's gt_normal_offset.npy holds
@@ -26,12 +32,14 @@ pub(super) struct Data {
 impl Data {
     /// The registry that the arguments name.
     pub(super) fn registry(&self) -> Result<Registry> {
-        let local = Path::new("datasets.toml");
-        Ok(match (&self.data, &self.datasets) {
-            (Some(folder), _) => Registry::scan(folder)?,
-            (None, Some(file)) => Registry::load(file)?,
-            (None, None) if local.is_file() => Registry::load(local)?,
-            (None, None) => Registry::embedded(),
+        if let Some(folder) = &self.data {
+            return Ok(Registry::scan(folder)?);
+        }
+        let local = || Path::new(LOCAL).is_file().then(|| LOCAL.into());
+        let named = std::env::var_os(VARIABLE).filter(|name| !name.is_empty()).map(PathBuf::from);
+        Ok(match self.datasets.clone().or(named).or_else(local) {
+            Some(file) => Registry::load(&file)?,
+            None => Registry::embedded(),
         })
     }
 
@@ -78,9 +86,17 @@ impl Data {
         Options { model: None, clothing: self.clothing }
     }
 
-    fn load(&self, dataset: &Dataset) -> Result<LoadedDataset> {
+    /// Loads the subjects of a data set, and which of its avatars the experiments name.
+    fn load(&self, dataset: &Dataset, experiments: &[Experiment]) -> Result<LoadedDataset> {
         let subjects = dataset.load(&self.options())?;
-        Ok(LoadedDataset { id: dataset.id.clone(), title: dataset.title.clone(), subjects })
+        let named = |wanted: &str| {
+            let recipes = experiments.iter().flat_map(|e| &e.variants).map(|variant| &variant.avatar);
+            recipes.into_iter().any(|r| matches!(r, AvatarRecipe::File { name, .. } if name == wanted))
+        };
+        let avatars = dataset.avatars.iter().filter(|avatar| named(&avatar.name));
+        let avatars = avatars.map(|a| RegisteredAvatar { name: a.name.clone(), path: a.path.clone() });
+        let (id, title) = (dataset.id.clone(), dataset.title.clone());
+        Ok(LoadedDataset { id, title, subjects, avatars: avatars.collect() })
     }
 
     /// Loads what the experiments can use: their own datasets, and those that may stand in.
@@ -89,7 +105,7 @@ impl Data {
         let stands_in = experiments.iter().any(|experiment| experiment.stand_in.is_some());
         let wanted = |d: &&Dataset| d.is_available() && (own(&d.id) || (stands_in && d.stand_in));
         let registry = self.registry()?;
-        let loaded = registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset));
+        let loaded = registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset, experiments));
         Ok(Library::new(loaded.collect::<Result<_>>()?))
     }
 }

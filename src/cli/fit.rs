@@ -5,7 +5,8 @@ use super::output::{Format, emit, emit_json};
 use super::progress::Watch;
 use super::{Context, Exit};
 use crate::experiment::Profile;
-use crate::run::fitting::{self, FitEvent, FitFiles, FitReport, HeldOut, Tests};
+use crate::run::fitting::{self, FitEvent, FitFiles, FitReport, Tests};
+use crate::run::held_out::HeldOut;
 use anyhow::{Context as _, Result, bail};
 use skinsplat_data::select::evenly_spaced;
 use skinsplat_data::{Sequence, Subject};
@@ -83,7 +84,9 @@ impl Fit {
         let report = fitting::fit(&training, &options, &trained_on, &files, tests, &mut |event| {
             match event {
                 FitEvent::Starting => watch.start("start", 1),
-                FitEvent::Warning(text) => watch.above(&format!("warning: {text}"), context.quiet),
+                FitEvent::Warning(text) | FitEvent::Damage(text) => {
+                    watch.above(&format!("warning: {text}"), context.quiet)
+                }
                 FitEvent::Step(step) => watch.fitting(step),
             }
             Ok(())

@@ -9,9 +9,10 @@ use crate::run::store;
 use anyhow::{Context as _, Result, anyhow, bail};
 use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, Binding, Body, Image, Mask};
+use skinsplat_data::avatar::{LoadedAvatar, read_avatar};
 use skinsplat_data::folder::{self, Options};
 use skinsplat_data::npz::Archive;
-use skinsplat_data::{Subject, body, camera, frames, ply, poses};
+use skinsplat_data::{Subject, body, camera, frames, poses, splatting_avatar};
 use std::path::{Path, PathBuf};
 
 /// Show what a file or folder holds, and what is wrong with it.
@@ -37,7 +38,7 @@ impl Inspect {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         let text = match extension.as_str() {
             _ if path.is_dir() => folder_text(path)?,
-            "ply" => avatar_text(&ply::read(path)?),
+            "ply" => avatar_text(&read_avatar(path)?),
             "glb" | "gltf" => body_text(&body::load(path)?) + &clips_text(path)?,
             "npz" => archive_text(path)?,
             "json" => json_text(path)?,
@@ -70,14 +71,14 @@ fn spread(values: impl IntoIterator<Item = f32>) -> String {
     }
 }
 
-fn avatar_text(stored: &ply::Stored) -> String {
-    let Avatar { gaussians, binding } = &stored.avatar;
+fn avatar_text(loaded: &LoadedAvatar) -> String {
+    let Avatar { gaussians, binding } = &loaded.avatar;
     let binding = match binding {
         Binding::Static => "none: a static scene".to_owned(),
         Binding::Vertex(weights) => format!("joint weights, up to {} per Gaussian", weights.max_influences()),
         Binding::Face(_) => "faces: barycentric coordinates and offset".to_owned(),
     };
-    let mut text = line("kind", "3DGS PLY") + &line("Gaussians", gaussians.len());
+    let mut text = line("kind", loaded.format.title()) + &line("Gaussians", gaussians.len());
     text += &line("SH degree", gaussians.sh_degree);
     text += &line("binding", binding);
     let low = gaussians.means.iter().copied().reduce(glam::Vec3::min).unwrap_or_default();
@@ -88,10 +89,13 @@ fn avatar_text(stored: &ply::Stored) -> String {
         spread(gaussians.log_scales.iter().flat_map(|s| s.map(portable::exp).to_array())),
     );
     text += &line("opacity", spread(gaussians.opacities()));
-    if let Some(body) = &stored.body {
+    if let Some(body) = &loaded.body {
         text += &line("body", body);
     }
-    text + &stored.comments.iter().map(|comment| line("comment", comment)).collect::<String>()
+    let comments = loaded.comments.iter().map(|comment| line("comment", comment));
+    let notes = loaded.notes.iter().map(|note| line("note", note));
+    let beside = loaded.files.iter().skip(1).map(|file| line("belongs to it", file.display()));
+    text + &comments.chain(notes).chain(beside).collect::<String>()
 }
 
 fn body_text(model: &Body) -> String {
@@ -198,6 +202,9 @@ fn image_text((image, alpha): &(Image, Option<Mask>)) -> String {
 }
 
 fn folder_text(path: &Path) -> Result<String> {
+    if splatting_avatar::is_export(&path.join(splatting_avatar::GAUSSIANS)) {
+        return Ok(avatar_text(&read_avatar(path)?));
+    }
     if folder::is_subject(path) {
         return Ok(line("kind", "subject") + &subject_text(&Subject::load(path, &Options::default())?));
     }

@@ -61,7 +61,10 @@ impl List {
     fn datasets(&self) -> Result<Table> {
         let here = |d: &crate::datasets::Dataset| match (d.is_available(), &d.path) {
             (true, _) => "available".to_owned(),
-            (false, Some(path)) => format!("not available: put it in {}", path.display()),
+            (false, Some(path)) => {
+                let looked = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+                format!("not available: looked in {}", looked.display())
+            }
             (false, None) => "not available".to_owned(),
         };
         let registry = self.data.registry()?;

@@ -2,10 +2,13 @@
 
 use super::data::Data;
 use super::lpips::LpipsWeights;
-use crate::experiment::{self, Experiment, GivenWeights, Options, Plan, Profile, Subset};
-use crate::run::Library;
+use crate::experiment::{
+    self, AvatarRecipe, Experiment, GIVEN_AVATAR, GivenWeights, Options, Plan, Profile, Subset, Variant,
+};
+use crate::run::{Library, RegisteredAvatar};
 use anyhow::{Result, bail};
 use skinsplat_metrics::lpips::weights::Networks;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// What to plan.
@@ -26,6 +29,9 @@ pub(super) struct Planning {
     /// Add a row for every strategy
     #[arg(long)]
     all_strategies: bool,
+    /// Take a variant's avatar from FILE, in which {subject} stands for the id of each subject (may be repeated)
+    #[arg(long = "avatar", value_name = "VARIANT=FILE", value_parser = given_avatar)]
+    avatars: Vec<GivenAvatar>,
     /// Only test frames START <= index < END of each sequence
     #[arg(long, value_name = "START..END", value_parser = range, help_heading = "Subset")]
     frames: Option<Range>,
@@ -44,6 +50,13 @@ pub(super) struct Planning {
     data: Data,
 }
 
+/// A file that replaces the avatar of a variant.
+#[derive(Clone, Debug)]
+struct GivenAvatar {
+    variant: String,
+    file: PathBuf,
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Range([usize; 2]);
 
@@ -58,8 +71,11 @@ pub(super) struct Planned {
 impl Planning {
     /// Loads experiments and data, and plans.
     pub(super) fn plan(&self) -> Result<Planned> {
-        let experiments = self.experiments()?;
-        let library = self.data.library(&experiments)?;
+        let experiments = self.with_given_avatars(self.experiments()?)?;
+        let mut library = self.data.library(&experiments)?;
+        for GivenAvatar { variant, file } in &self.avatars {
+            library.register(&RegisteredAvatar { name: given_name(variant), path: file.clone() });
+        }
         let subset = Subset {
             frames: self.frames.map(|Range(range)| range),
             limit: self.limit,
@@ -72,6 +88,30 @@ impl Planning {
         let options = Options { profile: self.profile(), subset, lpips_weights };
         let plan = experiment::plan(&experiments, &library.describe()?, &options)?;
         Ok(Planned { plan, experiments, library, networks })
+    }
+
+    /// The experiments with the avatars that the arguments name.
+    fn with_given_avatars(&self, mut experiments: Vec<Experiment>) -> Result<Vec<Experiment>> {
+        for GivenAvatar { variant: id, file } in &self.avatars {
+            let all = experiments.iter_mut().flat_map(|experiment| &mut experiment.variants);
+            let (named, others): (Vec<&mut Variant>, Vec<_>) = all.partition(|variant| variant.id == *id);
+            let argument = format!("--avatar {id}={}", file.display());
+            if named.is_empty() {
+                let known: BTreeSet<&str> = others.iter().map(|variant| variant.id.as_str()).collect();
+                let known: Vec<&str> = known.into_iter().collect();
+                bail!("{argument}: no variant `{id}`; expected one of {}", known.join(", "));
+            }
+            for variant in named {
+                if variant.strategy.is_none() {
+                    bail!(
+                        "{argument}: a textured mesh without a strategy; expected a variant that poses Gaussians"
+                    );
+                }
+                variant.avatar = AvatarRecipe::File { name: given_name(id), otherwise: None };
+                variant.sh_degree = None;
+            }
+        }
+        Ok(experiments)
     }
 
     fn profile(&self) -> Profile {
@@ -109,6 +149,20 @@ pub(super) fn known_experiments() -> Result<Vec<Experiment>> {
 
 pub(super) fn profile(id: &str) -> Result<Profile, String> {
     Profile::preset(id).ok_or_else(|| format!("expected one of {}", Profile::IDS.join(", ")))
+}
+
+fn given_avatar(text: &str) -> Result<GivenAvatar, String> {
+    match text.split_once('=') {
+        Some((variant, file)) if !variant.is_empty() && !file.is_empty() => {
+            Ok(GivenAvatar { variant: variant.to_owned(), file: file.into() })
+        }
+        _ => Err("expected VARIANT=FILE, such as original=avatars/{subject}.ply".to_owned()),
+    }
+}
+
+/// The name under which the avatar is registered that an argument gives to a variant: no data set has it.
+fn given_name(variant: &str) -> String {
+    format!("{GIVEN_AVATAR}{variant}")
 }
 
 fn range(text: &str) -> Result<Range, String> {

@@ -1,9 +1,18 @@
 //! An avatar, a body, a frame of a pose track and a strategy: the arguments of `render` and `skin`.
 
+use crate::run::drawable::{Drawable, Look, PosedView, Scratch};
+use crate::run::foreign::on_body;
+use crate::run::textured::TexturedFiles;
 use anyhow::{Context as _, Result, bail};
-use skinsplat_core::scene::{Avatar, Binding, Body, Camera, OwnedPosed, Pose, Posed, PosedBody, RestBody};
-use skinsplat_data::{body, ply, poses};
+use skinsplat_core::scene::{
+    Avatar, Binding, Body, Camera, Image, OwnedPosed, Pose, Posed, PosedBody, RestBody,
+};
+use skinsplat_data::avatar::read_avatar;
+use skinsplat_data::{body, poses};
+use skinsplat_fit::texture::TexturedBody;
 use skinsplat_posing::{BoundAvatar, JointLift, PoseOptions, Poser, Strategy};
+use skinsplat_render::splat;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Which pose to take, and how to rotate the Gaussians.
@@ -30,9 +39,13 @@ pub(super) struct Posing {
 /// An avatar that is ready to be posed.
 pub(super) struct Subject {
     avatar: Avatar,
+    /// The mesh that is drawn with the Gaussians, of a hybrid.
+    mesh: Option<TexturedBody>,
     rest: Option<(RestBody, Pose)>,
     /// The poses of the track before this one.
     before: Vec<Pose>,
+    /// What has to be said of the avatar.
+    notes: Vec<String>,
 }
 
 impl Posing {
@@ -48,14 +61,13 @@ impl Posing {
 
     /// Loads the avatar and, if a body was named, the body in its shape and the pose of the frame.
     pub(super) fn load(&self, avatar: &Path) -> Result<Subject> {
-        let mut loaded = ply::read_avatar(avatar)?;
+        let mut loaded = read_avatar(avatar)?;
         let Some(body_path) = &self.body else {
-            if !matches!(loaded.binding, Binding::Static) {
-                loaded.binding = Binding::Static;
-            }
-            return Ok(Subject { avatar: loaded, rest: None, before: Vec::new() });
+            loaded.avatar.binding = Binding::Static;
+            let (avatar, notes) = (loaded.avatar, Vec::new());
+            return Ok(Subject { avatar, mesh: None, rest: None, before: Vec::new(), notes });
         };
-        if matches!(loaded.binding, Binding::Static) {
+        if !loaded.is_bound() {
             let expected = "joint and weight properties, or face, barycentric and offset properties";
             bail!("{}: no binding; expected {expected}, to pose it with --body", avatar.display());
         }
@@ -68,10 +80,10 @@ impl Posing {
             }
             Some(path) => self.poses_to_frame(path, &model)?,
         };
-        loaded.validate(Some(&rest)).with_context(|| {
-            format!("{}: does not fit the body {}", avatar.display(), body_path.display())
-        })?;
-        Ok(Subject { avatar: loaded, rest: Some((rest, pose)), before })
+        let mesh = TexturedFiles::beside(&loaded.files[0]);
+        let mesh = mesh.exist().then(|| mesh.read(&rest)).transpose()?;
+        let (avatar, notes) = on_body(loaded, &rest)?;
+        Ok(Subject { avatar, mesh, rest: Some((rest, pose)), before, notes })
     }
 
     /// The body in its shape, the pose of the frame and those before it.
@@ -94,24 +106,34 @@ impl Subject {
         &self.avatar
     }
 
-    /// Poses the avatar and hands the Gaussians to `use_posed`; without a body they stay as they are. Where one camera looks
-    /// at them, what it does not need is left out.
+    /// What has to be said of the avatar, a clause each.
+    pub(super) fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Draws the avatar in its pose, with its mesh if it has one; without a body as it stands.
+    pub(super) fn image(&self, camera: &Camera, look: &Look) -> Result<Image> {
+        let Some((rest, pose)) = &self.rest else {
+            let posed = OwnedPosed::from_static(&self.avatar.gaussians);
+            return Ok(splat::render(&posed.as_posed(), &look.at(camera))?.image);
+        };
+        let drawable = Drawable::new(&self.avatar, self.mesh.as_ref().map(Cow::Borrowed), rest)?;
+        let view = PosedView { pose, camera, body: PosedBody::new(rest, pose)? };
+        Ok(drawable.draw(&view, look, &mut Scratch::default())?.image)
+    }
+
+    /// Poses the avatar and hands the Gaussians to `use_posed`; without a body they stay as they are.
     pub(super) fn posed<T>(
         &self,
         strategy: &Strategy,
-        camera: Option<&Camera>,
         use_posed: impl FnOnce(&Posed<'_>) -> Result<T>,
     ) -> Result<T> {
         let Some((rest, pose)) = &self.rest else {
             return use_posed(&OwnedPosed::from_static(&self.avatar.gaussians).as_posed());
         };
-        let mut bound = BoundAvatar::new(&self.avatar, rest)?;
-        if camera.is_some() {
-            bound = bound.without_zero_bands();
-        }
+        let bound = BoundAvatar::new(&self.avatar, rest)?;
         let body = PosedBody::new(rest, pose)?;
-        let options = PoseOptions { seen_by: camera, ..PoseOptions::default() };
-        use_posed(&Poser::new().pose(&bound, &body, strategy, &options)?)
+        use_posed(&Poser::new().pose(&bound, &body, strategy, &PoseOptions::default())?)
     }
 
     /// [`Subject::posed`] with the signs of joint quaternions followed through the track, from its first pose to this one.

@@ -1,15 +1,22 @@
-//! Progress on a terminal, and nowhere else.
+//! Progress: a bar on a terminal, a line per avatar and per sequence elsewhere.
 
 use crate::run::Event;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skinsplat_fit::train::Step;
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What a single fit is called.
 const FITTING: &str = "fitting";
 
-/// Draws a run's events as a bar on standard error, if that is a terminal.
+/// Shows a run's events on standard error: as a bar if that is a terminal, else as lines.
 pub(super) struct Watch {
     bar: ProgressBar,
+    quiet: bool,
+    /// Nobody sees a bar: lines take its place.
+    lines: bool,
+    /// Avatars begun.
+    avatars: AtomicU64,
 }
 
 const TEMPLATE: &str = "{msg:>8} {bar:40} {pos}/{len}, {elapsed} gone, {eta} left{prefix}";
@@ -24,14 +31,19 @@ impl Watch {
         if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
             bar.set_style(style);
         }
-        Self { bar }
+        let lines = !quiet && !std::io::stderr().is_terminal();
+        Self { bar, quiet, lines, avatars: AtomicU64::new(0) }
     }
 
-    /// Draws what happened.
+    /// Shows what happened.
     pub(super) fn see(&self, event: Event) {
         match event {
             Event::Avatars(count) => self.start("avatars", count),
             Event::Frames(count) => self.start("frames", count),
+            Event::Avatar(name) => {
+                let number = self.avatars.fetch_add(1, Ordering::Relaxed) + 1;
+                self.line(&format!("avatar {number}/{}: {name}", self.bar.length().unwrap_or_default()));
+            }
             Event::Fitting(step) => {
                 let Step { iteration, iterations, psnr, splats, .. } = step;
                 self.detail(format!(" | iteration {iteration}/{iterations}, {psnr:.2} dB, {splats} splats"));
@@ -40,6 +52,19 @@ impl Watch {
                 self.detail(String::new());
                 self.bar.inc(1);
             }
+            Event::SequenceDone(name, frames) => {
+                let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
+                self.line(&format!("sequence {name}: {frames} frames; {done} of {all} in all"));
+            }
+            Event::Warning(text) => self.above(&format!("warning: {text}"), self.quiet),
+        }
+    }
+
+    /// A line, where there is no bar.
+    #[allow(clippy::print_stderr, reason = "progress for whoever reads the log")]
+    fn line(&self, text: &str) {
+        if self.lines {
+            eprintln!("{text}");
         }
     }
 

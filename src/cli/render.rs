@@ -2,9 +2,9 @@
 
 use super::posing::Posing;
 use super::{Context, Exit, selection::parse_colour};
+use crate::run::drawable::Look;
 use anyhow::{Result, bail};
 use skinsplat_data::{camera, frames};
-use skinsplat_render::{View, splat};
 use std::path::PathBuf;
 
 /// Render a 3DGS PLY, posed or as it stands.
@@ -47,15 +47,14 @@ impl Render {
             bail!("{}: --out; expected a name that ends in .png or .npy", self.out.display());
         }
         let background = self.background.or(view.background).unwrap_or([0.0; 3]);
+        let look = Look { strategy: Some(self.posing.strategy()), background, antialiased: self.antialiased };
         let subject = self.posing.load(&self.file)?;
-        let rendered = subject.posed(&self.posing.strategy(), Some(&view.camera), |posed| {
-            let view = View::new(&view.camera).over(background).antialiased(self.antialiased);
-            Ok(splat::render(posed, &view)?)
-        })?;
+        let image = subject.image(&view.camera, &look)?;
         match extension.as_str() {
-            "png" => frames::save_png(&self.out, &rendered.image)?,
-            _ => frames::save_npy(&self.out, &rendered.image)?,
+            "png" => frames::save_png(&self.out, &image)?,
+            _ => frames::save_npy(&self.out, &image)?,
         }
+        subject.notes().iter().for_each(|note| context.note(format!("{}: {note}", self.file.display())));
         let (n, out) = (subject.avatar().gaussians.len(), self.out.display());
         context.note(format!("{out}: {n} Gaussians, {}x{}", view.camera.width, view.camera.height));
         Ok(Exit::Success)

@@ -66,7 +66,7 @@ impl Run {
         provenance.frames_planned = planned.plan.jobs.len();
         provenance.seconds = start.elapsed().as_secs_f64();
         if self.shard.is_some() {
-            return Ok(Exit::Success);
+            return self.verdict_of_shard(&planned, context);
         }
         self.write(&planned, &provenance, context)
     }
@@ -74,14 +74,31 @@ impl Run {
     /// Renders what is left to do; says how many frames that were.
     fn execute(&self, planned: &Planned, context: Context) -> Result<usize> {
         let Planned { plan, library, networks, .. } = planned;
-        let name = self.shard.map_or_else(|| FILE_NAME.to_owned(), Shard::file_name);
         let known = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
         let left = store::outstanding(plan.shard(self.shard), &known);
-        let mut store = Store::open(&self.out.join(name), &plan.digest)?;
+        let mut store = Store::open(&self.out.join(self.store_name()), &plan.digest)?;
         let watch = Watch::new(context.quiet);
         let avatars = self.out.join(AVATARS);
         run::execute(plan, &left, library, networks, &avatars, &mut store, &|event| watch.see(event))?;
         Ok(left.len())
+    }
+
+    /// Whether every frame of the slice has a score.
+    fn verdict_of_shard(&self, Planned { plan, .. }: &Planned, context: Context) -> Result<Exit> {
+        let known = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
+        let left = store::outstanding(plan.shard(self.shard), &known);
+        let missing: usize = left.iter().map(|job| job.variants.len()).sum();
+        if missing == 0 {
+            return Ok(Exit::Success);
+        }
+        let store = self.out.join(self.store_name());
+        context.note(format!("{missing} scores of this slice are missing; {} says why", store.display()));
+        Ok(Exit::Incomplete)
+    }
+
+    /// Name of the store that this call appends to.
+    fn store_name(&self) -> String {
+        self.shard.map_or_else(|| FILE_NAME.to_owned(), Shard::file_name)
     }
 
     /// The tables, from every record in the folder.

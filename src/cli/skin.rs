@@ -47,13 +47,12 @@ impl Skin {
             Some(Continuity::Previous) => {
                 subject.posed_following(&strategy, |posed| Ok(bake(posed, canonical)))?
             }
-            Some(Continuity::Rest) | None => {
-                subject.posed(&strategy, None, |posed| Ok(bake(posed, canonical)))?
-            }
+            Some(Continuity::Rest) | None => subject.posed(&strategy, |posed| Ok(bake(posed, canonical)))?,
         };
         let avatar = Avatar { gaussians: baked.gaussians, binding: Binding::Static };
         let metadata = ply::Metadata { body: None, comments: vec![format!("posed by {strategy}")] };
         ply::write_avatar(&self.out, &avatar, &metadata, ply::Encoding::LittleEndian)?;
+        subject.notes().iter().for_each(|note| context.note(format!("{}: {note}", self.avatar.display())));
         if let Some(loss) = baked.loss {
             context.note(format!("{}: {loss}", self.out.display()));
         }

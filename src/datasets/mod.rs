@@ -7,7 +7,7 @@ use skinsplat_data::folder::{self, Options, Subject};
 use skinsplat_data::peoplesnapshot::{self, Split};
 use skinsplat_data::{Capture, Error, error};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Every dataset that experiments can name.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,10 +33,10 @@ pub struct Dataset {
     pub licence: String,
     /// Who made it, and how.
     pub provenance: String,
-    /// A subject, or a folder that holds the subjects. Absolute after loading.
+    /// A subject, or a folder that holds the subjects. After loading relative to the current folder, or absolute.
     #[serde(default)]
     pub path: Option<PathBuf>,
-    /// Body model for layouts that do not bring one. Absolute after loading.
+    /// Body model for layouts that do not bring one. After loading as `path`.
     #[serde(default)]
     pub model: Option<PathBuf>,
     /// Whether its subjects may stand in for those of a dataset that is not here.
@@ -55,6 +55,20 @@ pub struct Dataset {
     /// What the generator of a synthetic dataset is given.
     #[serde(default)]
     pub parameters: toml::Table,
+    /// Avatars that somebody else made of its subjects.
+    #[serde(default)]
+    pub avatars: Vec<AvatarEntry>,
+}
+
+/// Avatars that somebody else made, one per subject that has one.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AvatarEntry {
+    /// Name by which experiments ask for it.
+    pub name: String,
+    /// The file, or the folder of an export; `{subject}` stands for the id of the subject. After loading as
+    /// [`Dataset::path`].
+    pub path: PathBuf,
 }
 
 /// The default of [`Dataset::stand_in`].
@@ -89,10 +103,10 @@ struct File {
 const EMBEDDED: &str = include_str!("../../datasets.toml");
 
 impl Registry {
-    /// The registry that the program was built with. Its paths lead into the source tree of the build.
+    /// The registry that the program was built with. Its paths are relative to the current folder: what is not there is
+    /// not available, and what is generated always is.
     pub fn embedded() -> Self {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        Self::parse(EMBEDDED, &root.join("datasets.toml")).expect("a test parses the embedded registry")
+        Self::parse(EMBEDDED, Path::new("datasets.toml")).expect("a test parses the embedded registry")
     }
 
     /// Loads a `datasets.toml`; paths in it are relative to its folder.
@@ -150,27 +164,36 @@ impl Registry {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut ids = BTreeSet::new();
         for (i, dataset) in datasets.iter_mut().enumerate() {
+            let invalid = |field: &str, problem: String, expected: &str| {
+                Error::invalid(path, format!("dataset[{i}].{field}"), problem, expected)
+            };
             if !ids.insert(dataset.id.clone()) {
-                let field = format!("dataset[{i}].id");
-                return Err(Error::invalid(
-                    path,
-                    field,
-                    format!("{:?} again", dataset.id),
-                    "an id of its own",
-                ));
+                return Err(invalid("id", format!("{:?} again", dataset.id), "an id of its own"));
             }
             let names = dataset.subjects.iter().chain(dataset.folders.values());
-            let within = names.into_iter().all(|s| Path::new(s).components().count() == 1);
-            if !within {
-                let expected = "names of folders inside path";
-                return Err(Error::invalid(path, format!("dataset[{i}].subjects"), "a path", expected));
+            if let Some(name) = names.into_iter().find(|name| !is_folder_name(name)) {
+                return Err(invalid(
+                    "subjects",
+                    format!("the path {name:?}"),
+                    "names of folders inside path",
+                ));
             }
-            for place in [&mut dataset.path, &mut dataset.model].into_iter().flatten() {
-                *place = folder.join(&*place);
+            let names: BTreeSet<&str> = dataset.avatars.iter().map(|avatar| avatar.name.as_str()).collect();
+            if names.len() < dataset.avatars.len() || names.contains("") {
+                return Err(invalid("avatars", "names that repeat or are empty".into(), "a name for each"));
             }
+            let avatars = dataset.avatars.iter_mut().map(|avatar| &mut avatar.path);
+            let places = [&mut dataset.path, &mut dataset.model].into_iter().flatten();
+            places.chain(avatars).for_each(|place| *place = folder.join(&*place));
         }
         Ok(Self { datasets, path: path.to_owned() })
     }
+}
+
+/// True for a name that leads one folder down and nowhere else.
+fn is_folder_name(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name)
 }
 
 impl Dataset {
@@ -242,6 +265,7 @@ fn found(folder: &Path) -> Result<Dataset, Error> {
         folders: BTreeMap::new(),
         splits: BTreeMap::new(),
         parameters: toml::Table::new(),
+        avatars: Vec::new(),
     })
 }
 

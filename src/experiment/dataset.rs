@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use skinsplat_data::Capture;
+use std::path::PathBuf;
 
 /// The part that a sequence plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -58,8 +59,30 @@ pub struct SubjectInfo {
 pub struct AvatarFile {
     /// Name that experiments use, unique in its subject.
     pub name: String,
-    /// Digest of the file.
-    pub digest: String,
+    /// The file, or the folder of an export. No key depends on it.
+    pub path: PathBuf,
+    /// What was found there.
+    pub state: AvatarState,
+}
+
+/// What was found where an avatar should be.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AvatarState {
+    /// An avatar that fits the subject's body.
+    Present {
+        /// Digest of its files.
+        digest: String,
+        /// What a reader of a table has to know of it, such as where its skinning weights come from.
+        notes: Vec<String>,
+    },
+    /// Nothing.
+    Absent,
+    /// Something that cannot be used.
+    Broken {
+        /// File, field and expectation, one line.
+        problem: String,
+    },
 }
 
 /// A data set that is present on this machine.

@@ -1,13 +1,14 @@
 //! Experiments as data: `experiments/*.toml` and descriptions of the data at hand become a [`Plan`].
 //!
 //! An [`Experiment`] says what one table asks: which data set, variants, protocol and columns, and what the paper
-//! printed. [`plan()`] is a pure function of experiments, [`Dataset`] descriptions and [`Options`]; it yields avatar
-//! builds and one [`Job`] per test frame, each with a content key that changes when anything changes that its numbers
+//! printed. [`plan()`] is a pure function of experiments, [`Dataset`] descriptions and [`Options`]; it yields avatars
+//! and one [`Job`] per test frame, each with a content key that changes when anything changes that its numbers
 //! depend on. A [`FrameRecord`] is what a job leaves behind. Nothing in this layer renders, and nothing reads a file
 //! but [`Experiment::load`] and [`Experiment::load_folder`].
 //!
 //! A further table is a further TOML file; a further column is one arm in [`MetricKind`](skinsplat_metrics::MetricKind).
 
+mod avatar;
 mod catalog;
 mod dataset;
 mod embedded;
@@ -23,15 +24,18 @@ mod spec;
 mod validate;
 mod versions;
 
-pub use dataset::{AvatarFile, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
+pub use avatar::{AvatarSource, PlannedAvatar, PlannedFit, TrainingFrames};
+pub use dataset::{AvatarFile, AvatarState, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
 pub use embedded::{EMBEDDED, FURTHER};
 pub use error::Error;
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
-pub use plan::{AvatarBuild, Job, JobVariant, Plan, PlannedFit, PlannedTable, plan};
+pub use plan::{Job, JobVariant, Plan, PlannedTable, plan};
 pub use profile::{GivenWeights, Options, Profile, Subset};
 pub use record::{FrameRecord, Outcome, Records, Seconds};
 pub use rows::{DataRow, Source};
 pub use seeds::Replicate;
 pub use shard::Shard;
-pub use spec::{ADDED_VARIANT, AvatarRecipe, Average, Column, Experiment, Layout, StandIn, Variant};
+pub use spec::{
+    ADDED_VARIANT, AvatarRecipe, Average, Column, Experiment, GIVEN_AVATAR, Layout, StandIn, Variant,
+};
 pub use versions::CodeVersions;

@@ -1,21 +1,17 @@
 //! From experiments and data to jobs: pure, no file is opened.
 
+use super::avatar::{PlannedAvatar, Planner};
 use super::rows::{DataRow, Source, rows_of};
 use super::{
-    AvatarRecipe, CodeVersions, Dataset, Error, Experiment, Options, SequenceInfo, Shard, SubjectInfo,
-    Variant, catalog,
+    CodeVersions, Dataset, Error, Experiment, Options, SequenceInfo, Shard, SubjectInfo, Variant, catalog,
 };
-use serde::Serialize;
-use serde_json::{Value, json};
+use serde::{Serialize, Serializer};
+use serde_json::json;
 use skinsplat_data::key::content_key;
-use skinsplat_fit::FitOptions;
-use skinsplat_fit::Recipe;
-use skinsplat_fit::surface::SurfaceInit;
-use skinsplat_fit::texture::TextureInit;
-use skinsplat_fit::train::Starting;
 use skinsplat_metrics::{MetricKind, Protocol, ProtocolId};
 use skinsplat_posing::Strategy;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Everything that a run has to do and a report has to show, as plain data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -25,7 +21,7 @@ pub struct Plan {
     /// One per experiment, in the given order.
     pub tables: Vec<PlannedTable>,
     /// The avatars that jobs need, each once whichever tables share it, in order of first use.
-    pub avatars: Vec<AvatarBuild>,
+    pub avatars: Vec<PlannedAvatar>,
     /// One per table and test frame: tables in order, sequences in order, frames ascending.
     pub jobs: Vec<Job>,
     /// SHA-256 over the keys of all jobs and the tables' shapes.
@@ -39,7 +35,7 @@ impl Plan {
     }
 
     /// The avatar of this key.
-    pub fn avatar(&self, key: &str) -> Option<&AvatarBuild> {
+    pub fn avatar(&self, key: &str) -> Option<&PlannedAvatar> {
         self.avatars.iter().find(|avatar| avatar.key == key)
     }
 
@@ -69,40 +65,6 @@ pub struct PlannedTable {
     pub protocol: ProtocolId,
 }
 
-/// An avatar to be made or read before its jobs can run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct AvatarBuild {
-    /// Content key.
-    pub key: String,
-    /// Data set.
-    pub dataset: String,
-    /// Subject.
-    pub subject: String,
-    /// Training sequence; none if the avatar is a file.
-    pub sequence: Option<String>,
-    /// Indices of the training frames, ascending.
-    pub frames: Vec<usize>,
-    /// How it is made.
-    pub recipe: AvatarRecipe,
-    /// SH degree; none if the recipe decides.
-    pub sh_degree: Option<u8>,
-    /// Longer side to which training frames are reduced, pixels; native if absent.
-    pub resolution: Option<u32>,
-    /// Edge length that the avatar resolves, millimetres.
-    pub edge_mm: u32,
-    /// How it is fitted; none if it is not.
-    pub fit: Option<PlannedFit>,
-}
-
-/// A fit to be made.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PlannedFit {
-    /// Recipe and budget.
-    pub options: FitOptions,
-    /// Content key of the avatar with which it starts: recipes that start alike share it.
-    pub start: String,
-}
-
 /// One test frame of one table: the truth is loaded once and every variant is rendered and scored against it, so that
 /// comparisons are paired.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -121,8 +83,9 @@ pub struct Job {
     pub frame: usize,
     /// Name of the frame.
     pub name: String,
-    /// Spec of the scoring protocol.
-    pub protocol: String,
+    /// The scoring protocol; serialised as its id.
+    #[serde(serialize_with = "id")]
+    pub protocol: Arc<Protocol>,
     /// Longer side to which the frame is reduced, pixels; native if absent.
     pub resolution: Option<u32>,
     /// Whether the antialiased rasterizer renders.
@@ -141,6 +104,11 @@ impl Job {
         let Self { dataset, subject, sequence, name, .. } = self;
         format!("{dataset}/{subject}/{sequence}/{name} {}", variant.id)
     }
+
+    /// The sequence with its subject and data set.
+    pub fn sequence_name(&self) -> String {
+        format!("{}/{}/{}", self.dataset, self.subject, self.sequence)
+    }
 }
 
 /// One way of rendering a frame.
@@ -150,10 +118,19 @@ pub struct JobVariant {
     pub id: String,
     /// Content key of the record: equal keys mean equal numbers, in whichever table.
     pub key: String,
-    /// Key of the [`AvatarBuild`].
+    /// Key of the [`PlannedAvatar`].
     pub avatar: String,
-    /// Strategy spec; none for a textured mesh.
-    pub strategy: Option<String>,
+    /// How its Gaussians are posed; none for a textured mesh. Serialised as its spec.
+    #[serde(serialize_with = "spec")]
+    pub strategy: Option<Strategy>,
+}
+
+fn id<S: Serializer>(protocol: &Protocol, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&protocol.id)
+}
+
+fn spec<S: Serializer>(strategy: &Option<Strategy>, serializer: S) -> Result<S::Ok, S::Error> {
+    strategy.map(|strategy| strategy.to_string()).serialize(serializer)
 }
 
 /// Plans the experiments on the data at hand.
@@ -180,7 +157,7 @@ pub fn plan(experiments: &[Experiment], datasets: &[Dataset], options: &Options)
 struct Builder<'a> {
     datasets: &'a [Dataset],
     options: &'a Options,
-    avatars: Vec<AvatarBuild>,
+    avatars: Vec<PlannedAvatar>,
     jobs: Vec<Job>,
 }
 
@@ -189,7 +166,7 @@ impl Builder<'_> {
     fn table(&mut self, index: usize, experiment: &Experiment) -> Result<PlannedTable, Error> {
         let (source, rows) = rows_of(experiment, self.datasets, self.options);
         let invalid = |(problem, expected)| Error::invalid(&experiment.id, "protocol", problem, expected);
-        let protocol = catalog::protocol(experiment.protocol_on(source)).map_err(invalid)?;
+        let protocol = Arc::new(catalog::protocol(experiment.protocol_on(source)).map_err(invalid)?);
         let wanted = &self.options.subset.variants;
         let variants: Vec<(usize, &Variant)> = (experiment.variants.iter().enumerate())
             .filter(|(_, variant)| wanted.is_empty() || wanted.contains(&variant.id))
@@ -230,79 +207,18 @@ impl Builder<'_> {
             Some(spec) => Some(catalog::strategy(spec).map_err(|why| invalid("strategy", why))?),
         };
         let avatar = self.avatar(variant, row).map_err(|why| invalid("avatar", why))?;
-        Ok(Prepared { variant: variant.clone(), avatar, strategy })
+        Ok(Prepared { variant: variant.id.clone(), avatar, strategy })
     }
 
-    /// The key of the variant's avatar for a row's subject; the build is noted if it is new. An avatar that cannot be
-    /// made is a problem and an expectation.
+    /// The key of the variant's avatar for a row's subject; the avatar is noted if it is new.
     fn avatar(&mut self, variant: &Variant, row: &DataRow) -> Result<String, (String, String)> {
-        let subject = self.subject(row);
-        let resolution = self.options.profile.resolution;
-        let mut build = AvatarBuild {
-            key: String::new(),
-            dataset: row.dataset.clone(),
-            subject: row.subject.clone(),
-            sequence: None,
-            frames: Vec::new(),
-            recipe: variant.avatar.clone(),
-            sh_degree: variant.sh_degree,
-            resolution: None,
-            edge_mm: self.options.profile.avatar_edge_mm,
-            fit: None,
-        };
-        let content = if let AvatarRecipe::File { name } = &variant.avatar {
-            let file = subject.avatars.iter().find(|avatar| &avatar.name == name);
-            let file = file.ok_or_else(|| {
-                let known: Vec<&str> = subject.avatars.iter().map(|avatar| avatar.name.as_str()).collect();
-                let problem = format!("{}/{} has no avatar `{name}`", row.dataset, row.subject);
-                (problem, format!("one of those it has: {}", known.join(", ")))
-            })?;
-            json!({ "file": file.digest })
-        } else {
-            let (sequence, frames) = row.train.clone().ok_or_else(|| {
-                let problem = format!("{}/{} has no training sequence", row.dataset, row.subject);
-                (problem, "a subject with one, or a recipe that reads a file".to_owned())
-            })?;
-            let digest = &find_sequence(subject, &sequence).digest;
-            let of_frames = json!({
-                "code": CodeVersions::CURRENT.fit, "train": digest, "frames": frames, "resolution": resolution,
-                "edge_mm": build.edge_mm,
-            });
-            let fit = self.fit(&variant.avatar, &of_frames)?;
-            let content = match &fit {
-                Some(PlannedFit { options, .. }) => json!({
-                    "made": of_frames, "code": CodeVersions::CURRENT, "recipe": options.recipe.choices(),
-                    "iterations": options.iterations, "seed": options.seed,
-                }),
-                None => {
-                    let defaults = (SurfaceInit::default(), TextureInit::default());
-                    json!({
-                        "made": of_frames, "recipe": variant.avatar, "sh_degree": variant.sh_degree,
-                        "defaults": defaults,
-                    })
-                }
-            };
-            build = AvatarBuild { sequence: Some(sequence), frames, resolution, fit, ..build };
-            content
-        };
-        build.key = content_key(&json!({ "avatar": content }));
-        let key = build.key.clone();
+        let planner = Planner { profile: &self.options.profile, subject: self.subject(row), row };
+        let avatar = planner.avatar(variant)?;
+        let key = avatar.key.clone();
         if self.avatars.iter().all(|known| known.key != key) {
-            self.avatars.push(build);
+            self.avatars.push(avatar);
         }
         Ok(key)
-    }
-
-    /// The fit of a recipe, if it is one, on training frames that `of_frames` describes in full.
-    fn fit(&self, avatar: &AvatarRecipe, of_frames: &Value) -> Result<Option<PlannedFit>, (String, String)> {
-        let AvatarRecipe::Fit { name, seed } = avatar else { return Ok(None) };
-        let recipe =
-            Recipe::parse(name).map_err(|error| (error.to_string(), "a fitting recipe".to_owned()))?;
-        let profile = &self.options.profile;
-        let iterations = profile.fit_iterations.map_or(recipe.iterations, |most| recipe.iterations.min(most));
-        let options = FitOptions { recipe, iterations, seed: *seed, edge_mm: profile.avatar_edge_mm };
-        let start = content_key(&json!({ "start": of_frames, "how": Starting::of(&options) }));
-        Ok(Some(PlannedFit { options, start }))
     }
 
     /// The jobs of a row, one per frame. `place` is the index of the table and of the row.
@@ -311,7 +227,7 @@ impl Builder<'_> {
         place: (usize, usize),
         row: &DataRow,
         experiment: &Experiment,
-        protocol: &Protocol,
+        protocol: &Arc<Protocol>,
         variants: &[Prepared],
     ) {
         let test = find_sequence(self.subject(row), &row.sequence).clone();
@@ -319,7 +235,7 @@ impl Builder<'_> {
         let shows = |metric| experiment.columns.iter().any(|column| column.metric == metric);
         let (ssim, lpips) = (shows(MetricKind::Ssim), shows(MetricKind::Lpips));
         let weights = self.options.lpips_weights.as_ref().filter(|given| given.net == protocol.lpips.net);
-        let choices = Protocol { title: String::new(), source: String::new(), ..protocol.clone() };
+        let choices = Protocol { title: String::new(), source: String::new(), ..Protocol::clone(protocol) };
         for &frame in &row.frames {
             let variants = variants.iter().map(|prepared| {
                 let content = json!({
@@ -329,10 +245,10 @@ impl Builder<'_> {
                     "ssim": ssim, "lpips": lpips, "lpips_weights": weights.filter(|_| lpips),
                 });
                 JobVariant {
-                    id: prepared.variant.id.clone(),
+                    id: prepared.variant.clone(),
                     key: content_key(&json!({ "frame": content })),
                     avatar: prepared.avatar.clone(),
-                    strategy: prepared.variant.strategy.clone(),
+                    strategy: prepared.strategy,
                 }
             });
             self.jobs.push(Job {
@@ -343,7 +259,7 @@ impl Builder<'_> {
                 sequence: row.sequence.clone(),
                 frame,
                 name: test.frames[frame].name.clone(),
-                protocol: protocol.id.clone(),
+                protocol: protocol.clone(),
                 resolution,
                 antialiased: experiment.antialiased,
                 ssim,
@@ -362,14 +278,16 @@ impl Builder<'_> {
 
 /// A variant that is ready for the frames of one row.
 struct Prepared {
-    variant: Variant,
+    /// Id.
+    variant: String,
     /// Key of the avatar.
     avatar: String,
     /// The strategy in full, so that two specs of one strategy share their keys.
     strategy: Option<Strategy>,
 }
 
-fn find_sequence<'a>(subject: &'a SubjectInfo, id: &str) -> &'a SequenceInfo {
+/// The sequence of this id, which rows take from their subject.
+pub(super) fn find_sequence<'a>(subject: &'a SubjectInfo, id: &str) -> &'a SequenceInfo {
     subject.sequences.iter().find(|sequence| sequence.id == id).expect("rows name sequences of their subject")
 }
 

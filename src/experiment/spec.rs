@@ -10,6 +10,9 @@ use std::path::Path;
 /// How the ids of variants begin that [`Experiment::with_all_strategies`] adds.
 pub const ADDED_VARIANT: &str = "strategy-";
 
+/// How the names of avatars begin that the command line gives to a variant, whose id follows.
+pub const GIVEN_AVATAR: &str = "--avatar ";
+
 /// One table: what to ask of which data. See `experiments/README.md` for the file format.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -179,6 +182,9 @@ pub enum AvatarRecipe {
     File {
         /// Name under which it is registered.
         name: String,
+        /// The recipe by which an avatar is fitted where a subject has no such file; without it that is an error.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        otherwise: Option<String>,
     },
 }
 
@@ -188,9 +194,13 @@ impl AvatarRecipe {
         !matches!(self, Self::TexturedMesh { .. })
     }
 
-    /// True if it is made from training frames rather than read from a file.
-    pub fn is_built(&self) -> bool {
-        !matches!(self, Self::File { .. })
+    /// The recipe by which it is fitted, or may be.
+    pub fn fitting_recipe(&self) -> Option<&str> {
+        match self {
+            Self::Fit { name, .. } => Some(name),
+            Self::File { otherwise, .. } => otherwise.as_deref(),
+            Self::SurfaceVertex {} | Self::SurfaceFace {} | Self::TexturedMesh { .. } => None,
+        }
     }
 }
 

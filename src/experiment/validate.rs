@@ -105,33 +105,41 @@ fn variant_is_possible(variant: &Variant, key: &str, file: &str) -> Result<(), E
         }
         (None, false) => {}
     }
-    if let AvatarRecipe::Fit { name, .. } = &variant.avatar {
-        if let Err(error) = Recipe::parse(name) {
-            return fail("avatar.name", error.to_string(), "a fitting recipe");
-        }
-        if variant.sh_degree.is_some() {
-            return fail(
-                "sh_degree",
-                "given".into(),
-                "none: the fitting recipe has it (+sh_degree=2 varies it)",
-            );
-        }
-        return Ok(());
+    if let Some(recipe) = variant.avatar.fitting_recipe()
+        && let Err(error) = Recipe::parse(recipe)
+    {
+        let named_by_file = matches!(variant.avatar, AvatarRecipe::File { .. });
+        let field = if named_by_file { "avatar.otherwise" } else { "avatar.name" };
+        return fail(field, error.to_string(), "a fitting recipe");
     }
-    let made_gaussians = variant.avatar.is_gaussian() && variant.avatar.is_built();
-    match variant.sh_degree {
-        Some(degree) if degree > 3 => return fail("sh_degree", format!("{degree}"), "0 to 3"),
-        Some(_) if !made_gaussians => {
-            return fail("sh_degree", "given".into(), "none: it applies to Gaussians that are made here");
-        }
-        None if made_gaussians => return fail("sh_degree", "missing".into(), "0 to 3"),
-        _ => {}
-    }
+    sh_degree_is_possible(variant).or_else(|(problem, expected)| fail("sh_degree", problem, expected))?;
     match variant.avatar {
         AvatarRecipe::TexturedMesh { size } if !(16..=8192).contains(&size) => {
             fail("avatar.size", format!("{size}"), "16 to 8192 texels")
         }
         _ => Ok(()),
+    }
+}
+
+/// Gaussians that are gathered here have a degree, and nothing else has.
+fn sh_degree_is_possible(variant: &Variant) -> Result<(), (String, &'static str)> {
+    match (&variant.avatar, variant.sh_degree) {
+        (AvatarRecipe::SurfaceVertex {} | AvatarRecipe::SurfaceFace {}, None) => {
+            Err(("missing".to_owned(), "0 to 3"))
+        }
+        (AvatarRecipe::SurfaceVertex {} | AvatarRecipe::SurfaceFace {}, Some(degree)) if degree > 3 => {
+            Err((format!("{degree}"), "0 to 3"))
+        }
+        (AvatarRecipe::SurfaceVertex {} | AvatarRecipe::SurfaceFace {}, Some(_)) | (_, None) => Ok(()),
+        (AvatarRecipe::Fit { .. }, Some(_)) => {
+            Err(("given".to_owned(), "none: the fitting recipe has it (+sh_degree=2 varies it)"))
+        }
+        (AvatarRecipe::TexturedMesh { .. } | AvatarRecipe::File { .. }, Some(degree)) if degree > 3 => {
+            Err((format!("{degree}"), "0 to 3"))
+        }
+        (AvatarRecipe::TexturedMesh { .. } | AvatarRecipe::File { .. }, Some(_)) => {
+            Err(("given".to_owned(), "none: it applies to Gaussians that are made here"))
+        }
     }
 }
 

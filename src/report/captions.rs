@@ -1,7 +1,10 @@
 //! What a table says about where its numbers come from.
 
 use super::results::SequenceResults;
-use crate::experiment::{AvatarRecipe, Experiment, Options, PlannedTable, Profile, Source, Subset, Variant};
+use crate::experiment::{
+    AvatarRecipe, AvatarSource, Experiment, Job, Options, Plan, PlannedTable, Profile, Source, Subset,
+    Variant,
+};
 use skinsplat_data::Capture;
 
 /// The table's caption: of its own data, or the stand-in's, which does not name that data.
@@ -68,7 +71,7 @@ fn profile(profile: &Profile, experiment: &Experiment) -> String {
     if bounds.is_empty() {
         bounds.push("every frame at native resolution".to_owned());
     }
-    let fitted = |variant: &Variant| matches!(variant.avatar, AvatarRecipe::Fit { .. });
+    let fitted = |variant: &Variant| variant.avatar.fitting_recipe().is_some();
     if let Some(n) = profile.fit_iterations
         && experiment.variants.iter().any(fitted)
     {
@@ -105,6 +108,43 @@ fn subset(subset: &Subset) -> String {
         parts.push(format!("variants {}", subset.variants.join(", ")));
     }
     format!("Partial: {}", parts.join("; "))
+}
+
+/// Where the avatars of a variant come from that is read from files: name and digest of each, and what was fitted instead.
+/// None for a variant that is made here.
+pub(super) fn avatar_file(plan: &Plan, variant: &Variant, jobs: &[&Job]) -> Option<String> {
+    let AvatarRecipe::File { .. } = variant.avatar else { return None };
+    let mut subjects_by_origin: Vec<(String, Vec<&str>)> = Vec::new();
+    for job in jobs {
+        let avatar = job.variants.iter().find(|own| own.id == variant.id).map(|own| own.avatar.as_str())?;
+        let origin = origin(&plan.avatar(avatar)?.source);
+        let known = subjects_by_origin.iter_mut().find(|(other, _)| *other == origin);
+        match known {
+            Some((_, subjects)) if subjects.contains(&job.subject.as_str()) => {}
+            Some((_, subjects)) => subjects.push(&job.subject),
+            None => subjects_by_origin.push((origin, vec![&job.subject])),
+        }
+    }
+    let clauses: Vec<String> = subjects_by_origin
+        .iter()
+        .map(|(origin, subjects)| format!("{}: {origin}", subjects.join(", ")))
+        .collect();
+    (!clauses.is_empty()).then(|| format!("Avatar of {}: {}", variant.label, clauses.join("; ")))
+}
+
+/// Where an avatar comes from that may be a file.
+fn origin(source: &AvatarSource) -> String {
+    match source {
+        AvatarSource::File { path, digest, notes, .. } => {
+            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+            let name = name.replace(char::is_control, "\u{fffd}");
+            let short = digest.get(..12).unwrap_or(digest);
+            let notes: String = notes.iter().map(|note| format!(", {note}")).collect();
+            format!("the file {name} (SHA-256 {short}{notes})")
+        }
+        AvatarSource::Fit { fit, .. } => format!("no file, so fitted by {}", fit.options.recipe.id),
+        AvatarSource::Surface { .. } | AvatarSource::Textured { .. } => "made here".to_owned(),
+    }
 }
 
 /// `1 frame`, `2 frames`.

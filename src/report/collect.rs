@@ -1,5 +1,6 @@
 //! Records to results: what each planned frame became, and the protocol's aggregate of each sequence.
 
+use super::captions::avatar_file;
 use super::results::{FrameResult, Results, SCHEMA, SequenceResults, TableResults, VariantResults};
 use super::{Error, build, paper};
 use crate::experiment::{
@@ -45,13 +46,15 @@ fn table(
         sequence(row, &variants, &jobs, records, &protocol)
     });
     let sequences: Vec<SequenceResults> = sequences.collect::<Result<_, _>>()?;
+    let mut made = build::table(experiment, planned, &plan.options, &sequences);
+    made.ran_on.extend(variants.iter().filter_map(|variant| avatar_file(plan, variant, jobs)));
     Ok(TableResults {
         experiment: experiment.id.clone(),
         version: experiment.version,
         protocol: planned.protocol.clone(),
         datasets: planned.datasets.clone(),
         source: planned.source,
-        table: build::table(experiment, planned, &plan.options, &sequences),
+        table: made,
         comparisons: build::comparisons(experiment, &sequences),
         paper: experiment.paper.as_ref().map(|paper| paper::printed_table(experiment, paper)),
         sequences,

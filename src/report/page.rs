@@ -2,7 +2,8 @@
 
 use super::captions::count;
 use super::{Results, markdown};
-use crate::experiment::{ADDED_VARIANT, Options, Profile};
+use crate::experiment::{ADDED_VARIANT, AvatarRecipe, GIVEN_AVATAR, Options, Profile};
+use std::collections::BTreeSet;
 
 /// The page: how it was made, what is missing, and the tables.
 pub fn page(results: &Results) -> String {
@@ -31,6 +32,12 @@ pub fn page(results: &Results) -> String {
     text
 }
 
+/// The argument that gave a variant its avatar; the captions say which file that was.
+fn given_avatar(recipe: &AvatarRecipe) -> Option<String> {
+    let AvatarRecipe::File { name, .. } = recipe else { return None };
+    Some(format!("--avatar {}=FILE", name.strip_prefix(GIVEN_AVATAR)?))
+}
+
 /// The command that makes these tables again, from the same data.
 fn command(results: &Results) -> String {
     let Options { profile, subset, lpips_weights } = &results.options;
@@ -38,9 +45,11 @@ fn command(results: &Results) -> String {
     words.extend(results.tables.iter().map(|table| table.experiment.clone()));
     words.push(format!("--profile {}", profile.id));
     let variants = results.tables.iter().flat_map(|t| &t.sequences).flat_map(|sequence| &sequence.variants);
-    if variants.map(|variant| &variant.id).any(|id| id.starts_with(ADDED_VARIANT)) {
+    if variants.clone().map(|variant| &variant.id).any(|id| id.starts_with(ADDED_VARIANT)) {
         words.push("--all-strategies".to_owned());
     }
+    let given: BTreeSet<String> = variants.filter_map(|variant| given_avatar(&variant.avatar)).collect();
+    words.extend(given);
     let usual = Profile::preset(&profile.id).and_then(|preset| preset.fit_iterations);
     if let Some(iterations) = profile.fit_iterations.filter(|_| profile.fit_iterations != usual) {
         words.push(format!("--fit-iterations {iterations}"));

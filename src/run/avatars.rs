@@ -1,126 +1,178 @@
-//! Avatars that jobs need: built from training frames once, kept in the run's folder, read back bit for bit.
+//! Avatars that jobs need: read from files, or made from training frames once, kept in the run's folder and read back bit for
+//! bit.
 
+use super::cache::{self, Entry};
 use super::curve_frames::CurveFrames;
+use super::drawable::Drawable;
 use super::fitting::{self, FitEvent, FitFiles, Tests};
 use super::textured::TexturedFiles;
 use super::{Error, Event, Library};
-use crate::experiment::{AvatarBuild, AvatarRecipe, PlannedFit};
+use crate::experiment::{AvatarSource, Plan, PlannedAvatar, PlannedFit, TrainingFrames};
 use skinsplat_data::{Sequence, ply};
-use skinsplat_fit::surface::{BindTo, Placement, SurfaceInit, surface_init};
-use skinsplat_fit::texture::{TextureInit, TexturedBody, gather_texture};
-use skinsplat_posing::BoundAvatar;
-use std::path::{Path, PathBuf};
+use skinsplat_fit::surface::{SurfaceInit, surface_init};
+use skinsplat_fit::texture::{TextureInit, gather_texture};
+use std::borrow::Cow;
+use std::path::Path;
 
-/// An avatar that is ready to be posed.
-#[derive(Debug)]
-pub enum Prepared {
-    /// Gaussians, bound to the subject's body.
-    Gaussians(Box<BoundAvatar>),
-    /// The body's mesh under a texture.
-    Textured(TexturedBody),
-    /// Both, drawn together.
-    Hybrid(Box<BoundAvatar>, TexturedBody),
-}
-
-/// Reads an avatar from the run's folder, or builds it and keeps it there. Whether it was kept makes no difference to a
-/// single bit: a fresh avatar is read back too.
-///
-/// # Errors
-/// Training frames that cannot be read or used, or a folder that cannot be written.
-pub(super) fn prepare(
-    build: &AvatarBuild,
-    library: &Library,
-    curves: &mut CurveFrames<'_>,
-    folder: &Path,
-    watch: &(dyn Fn(Event) + Sync),
-) -> Result<Prepared, Error> {
-    let sequence = training(build, library)?;
-    let file = kept(build, folder);
-    if let AvatarRecipe::TexturedMesh { size } = build.recipe {
-        return Ok(Prepared::Textured(textured(&sequence, size, &file)?));
-    }
-    if let Some(planned) = &build.fit
-        && !file.is_file()
-    {
-        let tests = curves.of(build, library)?;
-        fit(build, planned, &sequence, &tests, file.clone(), folder, watch)?;
-    }
-    if !file.is_file() {
-        let avatar = surface_init(&sequence, &surface_options(build))?;
-        ply::write_avatar(&file, &avatar, &ply::Metadata::default(), ply::Encoding::LittleEndian)?;
-    }
-    let bound = Box::new(BoundAvatar::new(&ply::read_avatar(&file)?, &sequence.body)?.without_zero_bands());
-    let mesh = build.fit.as_ref().and_then(|planned| planned.options.recipe.mesh.as_ref());
-    Ok(match mesh {
-        Some(_) => {
-            Prepared::Hybrid(bound, FitFiles { avatar: file, start: None }.mesh().read(&sequence.body)?)
-        }
-        None => Prepared::Gaussians(bound),
-    })
-}
-
-/// Fits an avatar into `file`.
-fn fit(
-    build: &AvatarBuild,
-    planned: &PlannedFit,
-    sequence: &Sequence,
-    tests: &[Sequence],
-    file: PathBuf,
-    folder: &Path,
-    watch: &(dyn Fn(Event) + Sync),
-) -> Result<(), Error> {
-    let start = Some(folder.join(format!("{}.ply", planned.start)));
-    let files = FitFiles { avatar: file, start };
-    let name = format!("{}/{}/{}", build.dataset, build.subject, sequence.id);
-    let every = planned.options.iterations.div_ceil(CURVE_POINTS);
-    let tests = Tests { sequences: tests, every: Some(every), ssim: false };
-    fitting::fit(sequence, &planned.options, &name, &files, tests, &mut |event| {
-        if let FitEvent::Step(step) = event {
-            watch(Event::Fitting(step));
-        }
-        Ok(())
-    })?;
-    Ok(())
+/// Makes the avatars of a plan.
+pub(super) struct Workshop<'a> {
+    library: &'a Library,
+    curves: CurveFrames<'a>,
+    /// The run's folder of avatars.
+    folder: &'a Path,
+    watch: &'a (dyn Fn(Event) + Sync),
 }
 
 /// Points of the curve of test scores, after the start.
 const CURVE_POINTS: u32 = 5;
 
-/// The frames that an avatar is made from.
-fn training(build: &AvatarBuild, library: &Library) -> Result<Sequence, Error> {
-    let Some(id) = &build.sequence else {
-        return Err(Error::Absent {
-            name: format!("{}/{}: training sequence", build.dataset, build.subject),
-        });
-    };
-    let sequence = library.sequence(&build.dataset, &build.subject, id)?.selected(&build.frames)?;
-    Ok(match build.resolution {
-        Some(side) => sequence.reduced(side),
-        None => sequence,
-    })
-}
-
-fn kept(build: &AvatarBuild, folder: &Path) -> PathBuf {
-    let extension = if build.recipe.is_gaussian() { "ply" } else { "npy" };
-    folder.join(format!("{}.{extension}", build.key))
-}
-
-/// A textured body: its texture in `file`, its dressed vertices beside it.
-fn textured(sequence: &Sequence, size: u32, file: &Path) -> Result<TexturedBody, Error> {
-    let files = TexturedFiles { texture: file.to_owned(), vertices: file.with_extension("vertices.npy") };
-    if !files.exist() {
-        files.write(&gather_texture(sequence, &TextureInit { size, ..TextureInit::default() })?)?;
+impl<'a> Workshop<'a> {
+    /// Nothing made yet.
+    pub(super) fn new(
+        plan: &'a Plan,
+        library: &'a Library,
+        folder: &'a Path,
+        watch: &'a (dyn Fn(Event) + Sync),
+    ) -> Self {
+        Self { library, curves: CurveFrames::new(plan), folder, watch }
     }
-    files.read(&sequence.body)
+
+    /// Reads an avatar, from its own file or from the run's folder, where it is made if it is not there. Whether it was
+    /// there makes no difference to a single bit: a fresh avatar is read back too.
+    ///
+    /// # Errors
+    /// A file that cannot be read or does not fit the body, training frames that cannot be used, a folder that cannot be
+    /// written.
+    pub(super) fn prepare(&mut self, avatar: &PlannedAvatar) -> Result<Drawable<'static>, Error> {
+        match &avatar.source {
+            AvatarSource::File { path, sequence, .. } => {
+                let body = &self.library.sequence(&avatar.dataset, &avatar.subject, sequence)?.body;
+                Ok(Drawable::read(path, body)?.0)
+            }
+            AvatarSource::Surface { training, placement, bind_to, sh_degree, edge_mm } => {
+                let init = SurfaceInit {
+                    placement: *placement,
+                    bind_to: *bind_to,
+                    sh_degree: usize::from(*sh_degree),
+                    longest_edge: f64::from(*edge_mm) / 1000.0,
+                    ..SurfaceInit::default()
+                };
+                self.surface(avatar, &self.training(avatar, training)?, &init)
+            }
+            AvatarSource::Textured { training, size } => {
+                self.textured(avatar, &self.training(avatar, training)?, *size)
+            }
+            AvatarSource::Fit { training, fit } => {
+                let training = self.training(avatar, training)?;
+                self.fit(avatar, fit, &training)
+            }
+        }
+    }
+
+    fn surface(
+        &self,
+        avatar: &PlannedAvatar,
+        training: &Sequence,
+        init: &SurfaceInit,
+    ) -> Result<Drawable<'static>, Error> {
+        let entry = Entry::new(self.folder, &avatar.key, &["ply"]);
+        let file = entry.path("ply");
+        entry.ensure(
+            |damage| warn(self.watch, damage),
+            || {
+                let made = surface_init(training, init)?;
+                let metadata = ply::Metadata::default();
+                Ok(ply::write_avatar(&file, &made, &metadata, ply::Encoding::LittleEndian)?)
+            },
+        )?;
+        Ok(Drawable::read(&file, &training.body)?.0)
+    }
+
+    /// A textured body: its texture, its dressed vertices beside it.
+    fn textured(
+        &self,
+        avatar: &PlannedAvatar,
+        training: &Sequence,
+        size: u32,
+    ) -> Result<Drawable<'static>, Error> {
+        let entry = Entry::new(self.folder, &avatar.key, &["npy", "vertices.npy"]);
+        let files = TexturedFiles { texture: entry.path("npy"), vertices: entry.path("vertices.npy") };
+        let init = TextureInit { size, ..TextureInit::default() };
+        let make = || files.write(&gather_texture(training, &init)?);
+        entry.ensure(|damage| warn(self.watch, damage), make)?;
+        Ok(Drawable::Textured(Cow::Owned(files.read(&training.body)?)))
+    }
+
+    fn fit(
+        &mut self,
+        avatar: &PlannedAvatar,
+        planned: &PlannedFit,
+        training: &Sequence,
+    ) -> Result<Drawable<'static>, Error> {
+        let parts: &[&str] = match planned.options.recipe.mesh {
+            Some(_) => &["ply", "json", "texture.png", "vertices.npy"],
+            None => &["ply", "json"],
+        };
+        let entry = Entry::new(self.folder, &avatar.key, parts);
+        let start = Entry::new(self.folder, &planned.start, &["ply"]);
+        let files = FitFiles { avatar: entry.path("ply"), start: Some(start) };
+        let watch = self.watch;
+        entry.ensure(
+            |damage| warn(watch, damage),
+            || {
+                let tests = self.curves.of(avatar, self.library)?;
+                let name = format!("{}/{}/{}", avatar.dataset, avatar.subject, training.id);
+                let fit = || fit_into(&files, planned, training, &name, &tests, watch);
+                // The name of a checkpoint here is that of its fit: one that does not belong to it is damaged or of another
+                // version of the program.
+                match fit() {
+                    Err(Error::Checkpoint { path, problem }) => {
+                        warn(watch, format!("{}: {problem}; fitted from the start", path.display()))?;
+                        cache::remove(&path)?;
+                        fit()
+                    }
+                    fitted => fitted,
+                }
+            },
+        )?;
+        Ok(Drawable::read(&files.avatar, &training.body)?.0)
+    }
+
+    /// The frames that an avatar is made from.
+    fn training(&self, avatar: &PlannedAvatar, training: &TrainingFrames) -> Result<Sequence, Error> {
+        let TrainingFrames { sequence, frames, resolution } = training;
+        let whole = self.library.sequence(&avatar.dataset, &avatar.subject, sequence)?;
+        let selected = whole.selected(frames)?;
+        Ok(match resolution {
+            Some(side) => selected.reduced(*side),
+            None => selected,
+        })
+    }
 }
 
-fn surface_options(build: &AvatarBuild) -> SurfaceInit {
-    let (placement, bind_to) = match build.recipe {
-        AvatarRecipe::SurfaceFace {} => (Placement::Faces, BindTo::Faces),
-        _ => (Placement::Vertices, BindTo::Joints),
-    };
-    let default = SurfaceInit::default();
-    let sh_degree = build.sh_degree.map_or(default.sh_degree, usize::from);
-    let longest_edge = f64::from(build.edge_mm) / 1000.0;
-    SurfaceInit { placement, bind_to, sh_degree, longest_edge, ..default }
+/// Fits an avatar into its files, with a curve of scores on some test frames.
+fn fit_into(
+    files: &FitFiles,
+    planned: &PlannedFit,
+    training: &Sequence,
+    name: &str,
+    tests: &[Sequence],
+    watch: &(dyn Fn(Event) + Sync),
+) -> Result<(), Error> {
+    let every = Some(planned.options.iterations.div_ceil(CURVE_POINTS));
+    let tests = Tests { sequences: tests, every, ssim: false };
+    fitting::fit(training, &planned.options, name, files, tests, &mut |event| match event {
+        FitEvent::Starting => Ok(()),
+        FitEvent::Step(step) => {
+            watch(Event::Fitting(step));
+            Ok(())
+        }
+        FitEvent::Warning(text) | FitEvent::Damage(text) => warn(watch, text.to_owned()),
+    })?;
+    Ok(())
+}
+
+fn warn(watch: &(dyn Fn(Event) + Sync), text: String) -> Result<(), Error> {
+    watch(Event::Warning(text));
+    Ok(())
 }

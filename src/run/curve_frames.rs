@@ -1,7 +1,7 @@
 //! Held-out frames that say on the way of a fit how it does: a few, kept in memory for all fits of a subject.
 
 use super::{Error, Library};
-use crate::experiment::{AvatarBuild, Job, Plan};
+use crate::experiment::{Job, Plan, PlannedAvatar};
 use skinsplat_data::Sequence;
 use skinsplat_data::select::evenly_spaced;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,27 +25,37 @@ impl<'a> CurveFrames<'a> {
         Self { plan, loaded: BTreeMap::new() }
     }
 
-    /// Some of the frames on which the plan scores what is drawn with an avatar, at the avatar's resolution.
+    /// Some of the frames on which the plan scores what is drawn with an avatar, of the subject that it is made from and at
+    /// its resolution.
     ///
     /// # Errors
     /// Frames that cannot be read.
-    pub(super) fn of(&mut self, build: &AvatarBuild, library: &Library) -> Result<Arc<Vec<Sequence>>, Error> {
-        let key = self.key(build);
+    pub(super) fn of(
+        &mut self,
+        avatar: &PlannedAvatar,
+        library: &Library,
+    ) -> Result<Arc<Vec<Sequence>>, Error> {
+        let key = self.key(avatar);
         if let Some(loaded) = self.loaded.get(&key) {
             return Ok(loaded.clone());
         }
+        let (dataset, subject, resolution, frames) = &key;
         let few = |(id, frames): &(String, Vec<usize>)| {
-            let sequence = library.sequence(&build.dataset, &build.subject, id)?.selected(frames)?;
-            let sequence = build.resolution.map_or(sequence.clone(), |side| sequence.reduced(side));
+            let sequence = library.sequence(dataset, subject, id)?.selected(frames)?;
+            let sequence = resolution.map_or(sequence.clone(), |side| sequence.reduced(side));
             Ok(sequence.held()?)
         };
-        let sequences = Arc::new(key.3.iter().map(few).collect::<Result<Vec<_>, Error>>()?);
+        let sequences = Arc::new(frames.iter().map(few).collect::<Result<Vec<_>, Error>>()?);
         self.loaded.insert(key, sequences.clone());
         Ok(sequences)
     }
 
-    fn key(&self, build: &AvatarBuild) -> Key {
-        let draws = |job: &&Job| job.variants.iter().any(|variant| variant.avatar == build.key);
+    /// Data that is there under two names shares its avatars: only the frames under the avatar's own are looked at.
+    fn key(&self, avatar: &PlannedAvatar) -> Key {
+        let draws = |job: &&Job| {
+            (&job.dataset, &job.subject) == (&avatar.dataset, &avatar.subject)
+                && job.variants.iter().any(|variant| variant.avatar == avatar.key)
+        };
         let mut scored: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
         for job in self.plan.jobs.iter().filter(draws) {
             scored.entry(&job.sequence).or_default().insert(job.frame);
@@ -54,6 +64,7 @@ impl<'a> CurveFrames<'a> {
             (id.to_owned(), evenly_spaced(&frames.into_iter().collect::<Vec<_>>(), Some(FRAMES)))
         };
         let frames = scored.into_iter().map(few).collect();
-        (build.dataset.clone(), build.subject.clone(), build.resolution, frames)
+        let resolution = avatar.training().and_then(|training| training.resolution);
+        (avatar.dataset.clone(), avatar.subject.clone(), resolution, frames)
     }
 }

@@ -54,7 +54,7 @@ pub fn curves(plan: &Plan, folder: &Path) -> Result<Vec<Curve>, Error> {
             let path = folder.join(format!("{}.json", variant.avatar));
             let Ok(text) = std::fs::read_to_string(&path) else { continue };
             let report: FitReport = serde_json::from_str(&text)
-                .map_err(|error| Error::Checkpoint { path, problem: error.to_string() })?;
+                .map_err(|error| Error::Sidecar { path, problem: error.to_string() })?;
             curves.push(Curve {
                 experiment: experiment.clone(),
                 dataset: job.dataset.clone(),

@@ -2,7 +2,7 @@
 
 use super::store;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A run, or one of its frames, that cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -34,7 +34,34 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
-    /// A checkpoint that cannot be read.
+    /// A file that the system refuses to read or remove.
+    #[error("{}: cannot {action}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What was to be done with it.
+        action: &'static str,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The report beside a fitted avatar, if it is none.
+    #[error("{}: {problem}; expected the report of a fit (remove it and the avatar beside it to fit anew)", path.display())]
+    Sidecar {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Gaussians that are to be drawn without a strategy.
+    #[error("strategy: missing; expected one, since the avatar has Gaussians to pose")]
+    NoStrategy,
+    /// A test sequence on which nothing can be scored.
+    #[error("sequence {sequence}: frames: none; expected at least one to score")]
+    NoTestFrames {
+        /// The sequence.
+        sequence: String,
+    },
+    /// A checkpoint that cannot be read, or that belongs to another fit.
     #[error("{}: {problem}; expected a checkpoint of a fit (remove the file to start anew)", path.display())]
     Checkpoint {
         /// The file.
@@ -62,4 +89,16 @@ pub enum Error {
         /// Its id.
         protocol: String,
     },
+}
+
+impl Error {
+    /// What is wrong with going on from a checkpoint: if it is the checkpoint, its file is named.
+    pub(super) fn checkpoint(path: &Path, error: skinsplat_fit::Error) -> Self {
+        match error {
+            skinsplat_fit::Error::Checkpoint { problem } => {
+                Self::Checkpoint { path: path.to_owned(), problem }
+            }
+            other => other.into(),
+        }
+    }
 }

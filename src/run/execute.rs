@@ -1,8 +1,8 @@
 //! Executing jobs: one frame at a time, its truth loaded once, every variant posed, rendered and scored against it.
 
-use super::avatars::{Prepared, prepare};
-use super::curve_frames::CurveFrames;
-use super::frame::{Drawn, Frame, background};
+use super::avatars::Workshop;
+use super::drawable::{Drawable, Drawn, Look, Scratch};
+use super::frame::{Frame, Scored, background};
 use super::store::Store;
 use super::{Error, Library};
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
@@ -10,26 +10,30 @@ use rayon::prelude::*;
 use skinsplat_data::Sequence;
 use skinsplat_fit::train::Step;
 use skinsplat_metrics::lpips::{NetworkSource, OneFrame};
-use skinsplat_metrics::{PerceptualDistance, Protocol, Wanted};
-use skinsplat_render::splat::Renderer;
+use skinsplat_metrics::{PerceptualDistance, Wanted};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
 
 /// What happened, for whoever watches.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// So many avatars have to be made or read before the frames.
     Avatars(usize),
-    /// An iteration of the fit of one of them is done.
+    /// This one comes next.
+    Avatar(String),
+    /// An iteration of its fit is done.
     Fitting(Step),
+    /// Something is wrong, but not fatally.
+    Warning(String),
     /// One of them is there.
     AvatarReady,
     /// So many jobs are to be done.
     Frames(usize),
     /// One of them is done.
     FrameDone,
+    /// The last frame of a sequence is done, of so many.
+    SequenceDone(String, usize),
 }
 
 /// Does the jobs (what [`super::store::outstanding`] left of a plan's), and appends every record to the store as it comes.
@@ -47,21 +51,47 @@ pub fn execute(
     store: &mut Store,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<(), Error> {
-    jobs.iter().try_for_each(|job| background(job).map(drop))?;
+    jobs.iter().try_for_each(|job| background(&job.protocol).map(drop))?;
     let avatars = prepare_avatars(plan, jobs, library, folder, watch)?;
     watch(Event::Frames(jobs.len()));
-    let store = Mutex::new(store);
-    by_frame(jobs).par_iter().try_for_each_init(Renderer::new, |renderer, group| {
-        let records = run_frame(group, library, networks, &avatars, renderer);
-        let mut store = store.lock().unwrap_or_else(PoisonError::into_inner);
+    let state = Mutex::new((store, Left::of(jobs)));
+    by_frame(jobs).par_iter().try_for_each_init(Scratch::default, |scratch, group| {
+        let records = run_frame(group, library, networks, &avatars, scratch);
+        let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+        let (store, left) = &mut *state;
         store.append(&records)?;
-        group.iter().for_each(|_| watch(Event::FrameDone));
+        for job in group {
+            watch(Event::FrameDone);
+            left.done(job, watch);
+        }
         Ok::<(), Error>(())
     })
 }
 
+/// How many jobs each sequence has, and how many of them are left.
+struct Left(BTreeMap<String, [usize; 2]>);
+
+impl Left {
+    fn of(jobs: &[Job]) -> Self {
+        let mut left: BTreeMap<String, [usize; 2]> = BTreeMap::new();
+        for job in jobs {
+            left.entry(job.sequence_name()).or_default().iter_mut().for_each(|count| *count += 1);
+        }
+        Self(left)
+    }
+
+    fn done(&mut self, job: &Job, watch: &(dyn Fn(Event) + Sync)) {
+        let name = job.sequence_name();
+        let Some([all, left]) = self.0.get_mut(&name) else { return };
+        *left -= 1;
+        if *left == 0 {
+            watch(Event::SequenceDone(name, *all));
+        }
+    }
+}
+
 /// An avatar, or why there is none.
-pub(super) type Built = Result<Prepared, String>;
+pub(super) type Built = Result<Drawable<'static>, String>;
 
 pub(super) type Avatars = BTreeMap<String, Built>;
 
@@ -75,16 +105,15 @@ pub(super) fn prepare_avatars(
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<Avatars, Error> {
     let needed = |key: &str| jobs.iter().flat_map(|job| &job.variants).any(|variant| variant.avatar == key);
-    let builds: Vec<_> = plan.avatars.iter().filter(|build| needed(&build.key)).collect();
-    watch(Event::Avatars(builds.len()));
+    let planned: Vec<_> = plan.avatars.iter().filter(|avatar| needed(&avatar.key)).collect();
+    watch(Event::Avatars(planned.len()));
     std::fs::create_dir_all(folder).map_err(|source| Error::Folder { path: folder.to_owned(), source })?;
+    let mut workshop = Workshop::new(plan, library, folder, watch);
     let mut avatars = Avatars::new();
-    let mut curves = CurveFrames::new(plan);
-    for build in builds {
-        avatars.insert(
-            build.key.clone(),
-            prepare(build, library, &mut curves, folder, watch).map_err(|error| error.to_string()),
-        );
+    for avatar in planned {
+        watch(Event::Avatar(avatar.label()));
+        let built = workshop.prepare(avatar).map_err(|error| error.to_string());
+        avatars.insert(avatar.key.clone(), built);
         watch(Event::AvatarReady);
     }
     Ok(avatars)
@@ -106,37 +135,26 @@ fn run_frame(
     library: &Library,
     networks: &dyn NetworkSource,
     avatars: &Avatars,
-    renderer: &mut Renderer,
+    scratch: &mut Scratch,
 ) -> Vec<FrameRecord> {
-    let failed = |error: &Error| {
-        let record = |job: &&Job| {
-            let record =
-                |variant| record(job, variant, Outcome::Error(error.to_string()), Seconds::default());
-            job.variants.iter().map(record).collect::<Vec<_>>()
-        };
-        jobs.iter().flat_map(record).collect()
-    };
     let first = jobs[0];
-    let sequence = match test_sequence(first, library) {
-        Ok(sequence) => sequence,
-        Err(error) => return failed(&error),
-    };
-    let frame = match Frame::load(&sequence, first.frame) {
-        Ok(frame) => frame,
-        Err(error) => return failed(&error),
-    };
+    let sequence = test_sequence(first, library);
+    let frame = sequence
+        .as_ref()
+        .map_err(ToString::to_string)
+        .and_then(|sequence| Frame::load(sequence, first.frame, None).map_err(|error| error.to_string()));
     let distances = OneFrame::new(networks);
     let mut records = Vec::new();
     for job in jobs {
         for variant in &job.variants {
-            let mut seconds = Seconds::default();
-            let avatar = &avatars[&variant.avatar];
-            let outcome = match run_variant(job, variant, &frame, avatar, &distances, renderer, &mut seconds)
-            {
-                Ok(outcome) => outcome,
-                Err(error) => Outcome::Error(error.to_string()),
-            };
-            records.push(record(job, variant, outcome, seconds));
+            let outcome = frame.as_ref().map_err(Clone::clone).and_then(|frame| {
+                run_variant(job, variant, frame, &avatars[&variant.avatar], &distances, scratch)
+                    .map_err(|error| error.to_string())
+            });
+            let (outcome, seconds) =
+                outcome.unwrap_or_else(|problem| (Outcome::Error(problem), Seconds::default()));
+            let (key, label) = (variant.key.clone(), job.label(variant));
+            records.push(FrameRecord { key, label, outcome, seconds });
         }
     }
     records
@@ -148,8 +166,10 @@ pub(super) fn test_sequence(job: &Job, library: &Library) -> Result<Sequence, Er
     Ok(job.resolution.map_or_else(|| sequence.clone(), |side| sequence.reduced(side)))
 }
 
-fn record(job: &Job, variant: &JobVariant, outcome: Outcome, seconds: Seconds) -> FrameRecord {
-    FrameRecord { key: variant.key.clone(), label: job.label(variant), outcome, seconds }
+/// How a variant of a job is drawn.
+pub(super) fn look(job: &Job, variant: &JobVariant) -> Result<Look, Error> {
+    let background = background(&job.protocol)?;
+    Ok(Look { strategy: variant.strategy, background, antialiased: job.antialiased })
 }
 
 fn run_variant(
@@ -158,17 +178,13 @@ fn run_variant(
     frame: &Frame<'_>,
     avatar: &Built,
     distances: &dyn PerceptualDistance,
-    renderer: &mut Renderer,
-    seconds: &mut Seconds,
-) -> Result<Outcome, Error> {
+    scratch: &mut Scratch,
+) -> Result<(Outcome, Seconds), Error> {
     let avatar = avatar.as_ref().map_err(|problem| Error::Avatar { problem: problem.clone() })?;
-    let protocol = Protocol::parse(&job.protocol)?;
-    let drawn = frame.draw(job, variant, avatar, renderer, seconds)?;
-    let start = Instant::now();
-    let truth = skinsplat_metrics::Truth::Straight { rgb: &frame.truth.rgb, alpha: &frame.truth.alpha };
     let wanted = Wanted { ssim: job.ssim, lpips: job.lpips.then_some(distances) };
-    let score = protocol.score_with(&drawn.image, truth, wanted)?;
-    seconds.score = start.elapsed().as_secs_f64();
-    let Drawn { splats, visible_splats, .. } = drawn;
-    Ok(Outcome::Scored { score, splats, visible_splats })
+    let Scored { score, drawn, score_seconds } =
+        frame.evaluate(avatar, &look(job, variant)?, &job.protocol, wanted, scratch)?;
+    let Drawn { splats, visible_splats, pose_seconds, render_seconds, .. } = drawn;
+    let seconds = Seconds { pose: pose_seconds, render: render_seconds, score: score_seconds };
+    Ok((Outcome::Scored { score, splats, visible_splats }, seconds))
 }

@@ -2,14 +2,15 @@
 //! was made.
 
 use super::Error;
-use super::held_out::held_out;
+use super::cache::{self, Entry};
+use super::held_out::{HeldOut, held_out};
 use super::textured::TexturedFiles;
 use crate::experiment::CodeVersions;
 use serde::{Deserialize, Serialize};
-use skinsplat_core::scene::Avatar;
+use sha2::{Digest, Sha256};
 use skinsplat_data::{Sequence, atomic, ply};
 use skinsplat_fit::FitOptions;
-use skinsplat_fit::train::{self, Checkpoint, Fitted, Step, Trainer};
+use skinsplat_fit::train::{self, Checkpoint, Fitted, Started, Step, Trainer};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -27,7 +28,7 @@ pub struct FitFiles {
     /// The avatar, a 3DGS PLY with its binding.
     pub avatar: PathBuf,
     /// The avatar with which it starts, kept for other recipes; made anew if none.
-    pub start: Option<PathBuf>,
+    pub start: Option<Entry>,
 }
 
 impl FitFiles {
@@ -43,10 +44,7 @@ impl FitFiles {
 
     /// The mesh of a hybrid, beside the avatar.
     pub fn mesh(&self) -> TexturedFiles {
-        TexturedFiles {
-            texture: self.avatar.with_extension("texture.png"),
-            vertices: self.avatar.with_extension("vertices.npy"),
-        }
+        TexturedFiles::beside(&self.avatar)
     }
 }
 
@@ -73,21 +71,6 @@ pub struct FitReport {
     pub warnings: Vec<String>,
 }
 
-/// The score on frames that the fit did not see.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HeldOut {
-    /// Iterations done; 0 is the start.
-    pub iteration: u32,
-    /// The sequence.
-    pub sequence: String,
-    /// Mean PSNR over its frames, dB.
-    pub psnr: f64,
-    /// Mean SSIM over its frames; none if nobody asked.
-    pub ssim: Option<f64>,
-    /// Number of frames.
-    pub frames: usize,
-}
-
 /// Which frames say on the way how an avatar does where it was not fitted.
 #[derive(Clone, Copy, Debug)]
 pub struct Tests<'a> {
@@ -100,6 +83,14 @@ pub struct Tests<'a> {
 }
 
 impl Tests<'_> {
+    /// That every sequence has frames: known before the first iteration.
+    fn check(&self) -> Result<(), Error> {
+        match self.sequences.iter().find(|sequence| sequence.frames.is_empty()) {
+            Some(empty) => Err(Error::NoTestFrames { sequence: empty.id.clone() }),
+            None => Ok(()),
+        }
+    }
+
     fn are_due(&self, done: u32, iterations: u32) -> bool {
         done < iterations && self.every.is_some_and(|every| done.is_multiple_of(every))
     }
@@ -118,12 +109,15 @@ pub enum FitEvent<'a> {
     Step(Step),
     /// Something is wrong with the data, but not fatally.
     Warning(&'a str),
+    /// A file that is kept for several fits was damaged, and is made again.
+    Damage(&'a str),
 }
 
 /// Fits an avatar and writes it, with its sidecar. Their bits do not depend on how often the fit was interrupted.
 ///
 /// # Errors
-/// Training frames that cannot be used, a fit that diverges (the last checkpoint stays), files that cannot be written.
+/// Training frames that cannot be used, a test sequence without frames (before anything is done), a fit that diverges (the
+/// last checkpoint stays), test frames that cannot be read (the avatar stays, too), files that cannot be written.
 /// `watch` may stop the fit with an error of its own; the last checkpoint stays.
 pub fn fit(
     sequence: &Sequence,
@@ -131,27 +125,64 @@ pub fn fit(
     trained_on: &str,
     files: &FitFiles,
     tests: Tests<'_>,
-    watch: &mut dyn FnMut(FitEvent<'_>) -> Result<(), Error>,
+    watch: &mut Watch<'_>,
 ) -> Result<FitReport, Error> {
+    tests.check()?;
     let path = files.checkpoint();
     let mut progress = Progress::load(&path)?;
     let mut trainer = match progress.checkpoint.take() {
-        Some(checkpoint) => Trainer::resume(sequence, options, checkpoint)?,
-        None => {
-            watch(FitEvent::Starting)?;
-            let trainer = Trainer::new(sequence, options, start(sequence, options, files)?)?;
-            if tests.are_due(0, options.iterations) {
-                progress.held_out = tests.score(trainer.fitted(), options, 0)?;
-            }
-            trainer
+        Some(checkpoint) => {
+            Trainer::resume(sequence, options, checkpoint).map_err(|error| Error::checkpoint(&path, error))?
         }
+        None => started(sequence, options, files, tests, &mut progress, watch)?,
     };
+    iterate(&mut trainer, options, tests, &path, &mut progress, watch)?;
+    write_avatar(&trainer, files)?;
+    progress.held_out.extend(score_end(&trainer, files, sequence, options, tests)?);
+    let report = progress.report(&trainer, trained_on, sequence, options);
+    write_report(&files.sidecar(), &report)?;
+    cache::remove(&path)?;
+    Ok(report)
+}
+
+/// Whoever watches a fit.
+type Watch<'w> = dyn FnMut(FitEvent<'_>) -> Result<(), Error> + 'w;
+
+/// The trainer before its first iteration.
+fn started<'a>(
+    sequence: &'a Sequence,
+    options: &'a FitOptions,
+    files: &FitFiles,
+    tests: Tests<'_>,
+    progress: &mut Progress,
+    watch: &mut Watch<'_>,
+) -> Result<Trainer<'a>, Error> {
+    watch(FitEvent::Starting)?;
+    let Started { avatar, warnings } = start(sequence, options, files, watch)?;
+    for warning in warnings {
+        progress.note_warning(warning, watch)?;
+    }
+    let trainer = Trainer::new(sequence, options, avatar)?;
+    if tests.are_due(0, options.iterations) {
+        progress.held_out = tests.score(trainer.fitted(), options, 0)?;
+    }
+    Ok(trainer)
+}
+
+/// The iterations that are left, with a checkpoint now and then.
+fn iterate(
+    trainer: &mut Trainer<'_>,
+    options: &FitOptions,
+    tests: Tests<'_>,
+    checkpoint: &Path,
+    progress: &mut Progress,
+    watch: &mut Watch<'_>,
+) -> Result<(), Error> {
     let mut saved = Instant::now();
     while !trainer.is_done() {
         let step = trainer.step()?;
         for warning in trainer.take_warnings() {
-            watch(FitEvent::Warning(&warning))?;
-            progress.note_warning(warning);
+            progress.note_warning(warning, watch)?;
         }
         progress.note(step);
         watch(FitEvent::Step(step))?;
@@ -159,32 +190,25 @@ pub fn fit(
             progress.held_out.extend(tests.score(trainer.fitted(), options, step.iteration)?);
         }
         if trainer.is_resting() && saved.elapsed() > BETWEEN_CHECKPOINTS {
-            progress.save(&path, trainer.checkpoint())?;
+            progress.save(checkpoint, trainer.checkpoint()?)?;
             saved = Instant::now();
         }
     }
-    if let Some(mesh) = trainer.fitted().mesh {
-        files.mesh().write(mesh)?;
+    Ok(())
+}
+
+/// Writes the Gaussians, and the mesh of a hybrid; one of an earlier fit under this name goes.
+fn write_avatar(trainer: &Trainer<'_>, files: &FitFiles) -> Result<(), Error> {
+    let mesh = files.mesh();
+    match trainer.fitted().mesh {
+        Some(fitted) => mesh.write(fitted)?,
+        None => {
+            cache::remove(&mesh.texture)?;
+            cache::remove(&mesh.vertices)?;
+        }
     }
-    progress.held_out.extend(score_end(&trainer, files, sequence, options, tests)?);
-    let report = FitReport {
-        schema: SCHEMA,
-        code: CodeVersions::CURRENT,
-        trained_on: trained_on.to_owned(),
-        frames: sequence.frames.iter().map(|frame| frame.name.clone()).collect(),
-        options: options.clone(),
-        splats: trainer.avatar().gaussians.len(),
-        curve: progress.curve,
-        held_out: progress.held_out,
-        warnings: progress.warnings,
-    };
-    write_report(&files.sidecar(), &report)?;
     let metadata = ply::Metadata::default();
-    ply::write_avatar(&files.avatar, trainer.avatar(), &metadata, ply::Encoding::LittleEndian)?;
-    if path.is_file() {
-        std::fs::remove_file(&path).map_err(|source| Error::Folder { path, source })?;
-    }
-    Ok(report)
+    Ok(ply::write_avatar(&files.avatar, trainer.avatar(), &metadata, ply::Encoding::LittleEndian)?)
 }
 
 /// Scores the avatar as its files have it: a texture's colours were rounded.
@@ -205,15 +229,35 @@ fn write_report(path: &Path, report: &FitReport) -> Result<(), Error> {
     Ok(atomic::write(path, |w| w.write_all(text.as_bytes()))?)
 }
 
-/// The avatar with which a fit starts. It is read back from its file, so that it is the same whoever made it.
-fn start(sequence: &Sequence, options: &FitOptions, files: &FitFiles) -> Result<Avatar, Error> {
-    let Some(path) = &files.start else { return Ok(train::start(sequence, options)?) };
-    if !path.is_file() {
-        let avatar = train::start(sequence, options)?;
-        ply::write_avatar(path, &avatar, &ply::Metadata::default(), ply::Encoding::LittleEndian)?;
-    }
-    Ok(ply::read_avatar(path)?)
+/// How comments begin that hold the warnings of a start.
+const WARNING_COMMENT: &str = "skinsplat warning ";
+
+/// The avatar with which a fit starts. It is read back from its file, warnings included, so that it is the same whoever made
+/// it.
+fn start(
+    sequence: &Sequence,
+    options: &FitOptions,
+    files: &FitFiles,
+    watch: &mut Watch<'_>,
+) -> Result<Started, Error> {
+    let Some(entry) = &files.start else { return Ok(train::start(sequence, options)?) };
+    let path = entry.path("ply");
+    entry.ensure(
+        |damage| watch(FitEvent::Damage(&damage)),
+        || {
+            let Started { avatar, warnings } = train::start(sequence, options)?;
+            let comments = warnings.iter().map(|warning| format!("{WARNING_COMMENT}{warning}")).collect();
+            let metadata = ply::Metadata { body: None, comments };
+            Ok(ply::write_avatar(&path, &avatar, &metadata, ply::Encoding::LittleEndian)?)
+        },
+    )?;
+    let ply::Stored { avatar, comments, .. } = ply::read(&path)?;
+    let warning = |comment: &String| Some(comment.strip_prefix(WARNING_COMMENT)?.to_owned());
+    Ok(Started { avatar, warnings: comments.iter().filter_map(warning).collect() })
 }
+
+/// How checkpoint files begin; the SHA-256 of what follows it comes next.
+const CHECKPOINT: &[u8] = b"skinsplat checkpoint 2\n";
 
 /// What a checkpoint file holds.
 #[derive(Debug, Default, Serialize, Deserialize)]
@@ -231,16 +275,27 @@ impl Progress {
         if !path.is_file() {
             return Ok(Self::default());
         }
-        let bytes = std::fs::read(path).map_err(|source| Error::Folder { path: path.into(), source })?;
-        postcard::from_bytes(&bytes)
-            .map_err(|error| Error::Checkpoint { path: path.into(), problem: error.to_string() })
+        let cannot = |source| Error::File { path: path.into(), action: "read", source };
+        let bytes = std::fs::read(path).map_err(cannot)?;
+        let damaged = |problem: String| Error::Checkpoint { path: path.into(), problem };
+        let content = bytes.strip_prefix(CHECKPOINT).and_then(|rest| rest.split_first_chunk::<32>());
+        match content {
+            Some((sum, content)) if sum[..] == Sha256::digest(content)[..] => {
+                postcard::from_bytes(content).map_err(|error| damaged(error.to_string()))
+            }
+            Some(_) => Err(damaged("it is damaged: its checksum is another".to_owned())),
+            None => Err(damaged("its beginning is that of something else".to_owned())),
+        }
     }
 
     fn save(&mut self, path: &Path, checkpoint: Checkpoint) -> Result<(), Error> {
         self.checkpoint = Some(checkpoint);
         let bytes = postcard::to_stdvec(self).expect("every type here serialises");
         self.checkpoint = None;
-        Ok(atomic::write(path, |w| w.write_all(&bytes))?)
+        let sum = Sha256::digest(&bytes);
+        Ok(atomic::write(path, |w| {
+            [CHECKPOINT, &sum[..], &bytes].iter().try_for_each(|part| w.write_all(part))
+        })?)
     }
 
     fn note(&mut self, step: Step) {
@@ -256,9 +311,33 @@ impl Progress {
         }
     }
 
-    fn note_warning(&mut self, warning: String) {
+    /// How the fit went, when it is done.
+    fn report(
+        self,
+        trainer: &Trainer<'_>,
+        trained_on: &str,
+        sequence: &Sequence,
+        options: &FitOptions,
+    ) -> FitReport {
+        FitReport {
+            schema: SCHEMA,
+            code: CodeVersions::CURRENT,
+            trained_on: trained_on.to_owned(),
+            frames: sequence.frames.iter().map(|frame| frame.name.clone()).collect(),
+            options: options.clone(),
+            splats: trainer.avatar().gaussians.len(),
+            curve: self.curve,
+            held_out: self.held_out,
+            warnings: self.warnings,
+        }
+    }
+
+    /// Keeps a warning, and says it the first time.
+    fn note_warning(&mut self, warning: String, watch: &mut Watch<'_>) -> Result<(), Error> {
         if !self.warnings.contains(&warning) {
+            watch(FitEvent::Warning(&warning))?;
             self.warnings.push(warning);
         }
+        Ok(())
     }
 }

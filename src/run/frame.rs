@@ -1,95 +1,69 @@
-//! One frame: its truth, its camera, the body in its pose, and what a variant draws of it.
+//! One frame, loaded: its truth, its camera, the body in its pose. Here drawing and scoring meet.
 
 use super::Error;
-use super::avatars::Prepared;
-use crate::experiment::{Job, JobVariant, Seconds};
-use skinsplat_core::scene::{Camera, Image, Pose, Posed, PosedBody};
+use super::drawable::{Drawable, Drawn, Look, PosedView, Scratch};
+use skinsplat_core::scene::PosedBody;
 use skinsplat_data::{Sequence, Truth};
-use skinsplat_fit::texture::{SAMPLES, TexturedBody};
-use skinsplat_metrics::Protocol;
-use skinsplat_posing::{PoseOptions, Poser, Strategy};
-use skinsplat_render::View;
-use skinsplat_render::mesh::SamplePattern;
-use skinsplat_render::splat::Renderer;
+use skinsplat_metrics::{FrameScore, Protocol, Wanted};
 use std::time::Instant;
 
 /// A frame, loaded.
 pub(super) struct Frame<'a> {
     pub(super) truth: Truth,
-    camera: &'a Camera,
-    pose: &'a Pose,
-    body: PosedBody<'a>,
+    pub(super) view: PosedView<'a>,
+}
+
+/// What came of a drawing and its comparison with the truth.
+pub(super) struct Scored {
+    pub(super) score: FrameScore,
+    pub(super) drawn: Drawn,
+    pub(super) score_seconds: f64,
 }
 
 impl<'a> Frame<'a> {
-    pub(super) fn load(sequence: &'a Sequence, index: usize) -> Result<Self, Error> {
+    /// Loads a frame. If `joints_read` says which joints' rotations will be read, the others are left out.
+    ///
+    /// # Errors
+    /// A truth that cannot be read, a pose that does not fit the body.
+    pub(super) fn load(
+        sequence: &'a Sequence,
+        index: usize,
+        joints_read: Option<&[bool]>,
+    ) -> Result<Self, Error> {
         let truth = sequence.truth(index)?;
         let frame = &sequence.frames[index];
         let (pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
-        Ok(Self { truth, camera, pose, body: PosedBody::new(&sequence.body, pose)? })
+        let body = match joints_read {
+            Some(read) => PosedBody::with_rotations(&sequence.body, pose, |joint| read[joint])?,
+            None => PosedBody::new(&sequence.body, pose)?,
+        };
+        Ok(Self { truth, view: PosedView { pose, camera, body } })
     }
 
-    /// Draws the frame as a variant poses it, over the background of the job's protocol.
-    pub(super) fn draw(
+    /// Draws the frame and scores the drawing.
+    ///
+    /// # Errors
+    /// As [`Drawable::draw`]; an image that cannot be scored.
+    pub(super) fn evaluate(
         &self,
-        job: &Job,
-        variant: &JobVariant,
-        avatar: &Prepared,
-        renderer: &mut Renderer,
-        seconds: &mut Seconds,
-    ) -> Result<Drawn, Error> {
-        let background = background(job)?;
-        let (bound, mesh) = match avatar {
-            Prepared::Textured(textured) => {
-                let start = Instant::now();
-                let pattern = SamplePattern::new(SAMPLES);
-                let image = textured.draw(self.pose, self.camera, pattern, background)?.image;
-                seconds.render = start.elapsed().as_secs_f64();
-                return Ok(Drawn { image, splats: None, visible_splats: None });
-            }
-            Prepared::Gaussians(bound) => (bound, None),
-            Prepared::Hybrid(bound, mesh) => (bound, Some(mesh)),
-        };
-        let strategy: Strategy = variant.strategy.as_deref().unwrap_or_default().parse()?;
+        drawable: &Drawable<'_>,
+        look: &Look,
+        protocol: &Protocol,
+        wanted: Wanted<'_>,
+        scratch: &mut Scratch,
+    ) -> Result<Scored, Error> {
+        let drawn = drawable.draw(&self.view, look, scratch)?;
         let start = Instant::now();
-        let mut poser = Poser::new();
-        let options = PoseOptions { seen_by: Some(self.camera), ..PoseOptions::default() };
-        let posed = poser.pose(bound, &self.body, &strategy, &options)?;
-        seconds.pose = start.elapsed().as_secs_f64();
-        let view = View::new(self.camera).over(background).antialiased(job.antialiased);
-        let start = Instant::now();
-        let image = match mesh {
-            None => renderer.render(&posed, &view)?.image.clone(),
-            Some(mesh) => together(renderer, &posed, (mesh, self.pose), view)?,
-        };
-        seconds.render = start.elapsed().as_secs_f64();
-        let (splats, visible) = (posed.len() as u64, renderer.visible() as u64);
-        Ok(Drawn { image, splats: Some(splats), visible_splats: Some(visible) })
+        let truth = skinsplat_metrics::Truth::Straight { rgb: &self.truth.rgb, alpha: &self.truth.alpha };
+        let score = protocol.score_with(&drawn.image, truth, wanted)?;
+        Ok(Scored { score, drawn, score_seconds: start.elapsed().as_secs_f64() })
     }
 }
 
-/// Gaussians and a textured mesh in a pose, drawn together.
-pub(super) fn together(
-    renderer: &mut Renderer,
-    posed: &Posed<'_>,
-    (mesh, pose): (&TexturedBody, &Pose),
-    view: View<'_>,
-) -> Result<Image, Error> {
-    let drawing = mesh.drawing(pose, view.camera, SamplePattern::new(SAMPLES))?;
-    Ok(renderer.render(posed, &view.with_underlay(Some(drawing.underlay())))?.image.clone())
-}
-
-/// What a variant looks like.
-pub(super) struct Drawn {
-    pub(super) image: Image,
-    /// Gaussians of the avatar; none for a textured mesh.
-    pub(super) splats: Option<u64>,
-    /// Those that reach the image.
-    pub(super) visible_splats: Option<u64>,
-}
-
-/// The background of a job's protocol.
-pub(super) fn background(job: &Job) -> Result<[f32; 3], Error> {
-    let none = || Error::NoBackground { protocol: job.protocol.clone() };
-    Protocol::parse(&job.protocol)?.background_colour().ok_or_else(none)
+/// The background of a protocol.
+///
+/// # Errors
+/// A captured background, which no data has.
+pub(super) fn background(protocol: &Protocol) -> Result<[f32; 3], Error> {
+    protocol.background_colour().ok_or_else(|| Error::NoBackground { protocol: protocol.id.clone() })
 }

@@ -3,14 +3,13 @@
 //! A picture has the truth and every variant side by side, in the table's order, cropped to the subject; below each variant
 //! its absolute error, four times enlarged.
 
-use super::avatars::Prepared;
-use super::execute::{prepare_avatars, test_sequence};
+use super::drawable::Scratch;
+use super::execute::{look, prepare_avatars, test_sequence};
 use super::frame::{Frame, background};
 use super::{Error, Event, Library};
-use crate::experiment::{Job, Outcome, Plan, Records, Seconds};
+use crate::experiment::{Job, Outcome, Plan, Records};
 use skinsplat_core::scene::{Image, Mask, SceneError};
 use skinsplat_data::frames::save_png;
-use skinsplat_render::splat::Renderer;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -36,7 +35,7 @@ pub fn write(
     let jobs: Vec<Job> = chosen.iter().map(|&job| job.clone()).collect();
     let avatars = prepare_avatars(plan, &jobs, library, avatars, watch)?;
     watch(Event::Frames(jobs.len()));
-    let mut renderer = Renderer::new();
+    let mut scratch = Scratch::default();
     let mut page = format!(
         "# Pictures\n\nFor each sequence, the frame on which the variants differ most in PSNR: the truth, then the variants in \
          the table's order; below, their absolute errors times {ERROR_GAIN}.\n"
@@ -44,14 +43,14 @@ pub fn write(
     for job in chosen {
         let mut images = Vec::new();
         let sequence = test_sequence(job, library)?;
-        let frame = Frame::load(&sequence, job.frame)?;
+        let frame = Frame::load(&sequence, job.frame, None)?;
         for variant in &job.variants {
-            let avatar: &Prepared = avatars[&variant.avatar]
+            let avatar = avatars[&variant.avatar]
                 .as_ref()
                 .map_err(|problem| Error::Avatar { problem: problem.clone() })?;
-            images.push(frame.draw(job, variant, avatar, &mut renderer, &mut Seconds::default())?.image);
+            images.push(avatar.draw(&frame.view, &look(job, variant)?, &mut scratch)?.image);
         }
-        let truth = frame.truth.rgb.composited(&frame.truth.alpha, background(job)?)?;
+        let truth = frame.truth.rgb.composited(&frame.truth.alpha, background(&job.protocol)?)?;
         let table = &plan.tables[job.table];
         let name = file_name(&format!("{}-{}-{}", table.experiment, table.rows[job.row].label, job.name));
         save_png(&folder.join(&name), &strip(&truth, &images, &frame.truth.alpha)?)?;

@@ -1,18 +1,33 @@
 //! How good an avatar is on frames that its fit did not see.
 
 use super::Error;
-use super::fitting::HeldOut;
-use super::frame::together;
+use super::drawable::{Drawable, Look, Scratch};
+use super::frame::Frame;
 use rayon::prelude::*;
-use skinsplat_core::scene::{PosedBody, RestBody};
+use serde::{Deserialize, Serialize};
+use skinsplat_core::scene::RestBody;
 use skinsplat_data::Sequence;
-use skinsplat_fit::texture::TexturedBody;
 use skinsplat_fit::train::Fitted;
 use skinsplat_metrics::{Protocol, Wanted};
-use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
-use skinsplat_render::View;
-use skinsplat_render::splat::Renderer;
+use skinsplat_posing::Strategy;
+use std::borrow::Cow;
 use std::sync::Arc;
+
+/// The score on frames that the fit did not see.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// Iterations done; 0 is the start.
+    pub iteration: u32,
+    /// The sequence.
+    pub sequence: String,
+    /// Mean PSNR over its frames, dB; +inf, which JSON holds as `null`, if one of them is hit exactly.
+    #[serde(with = "infinity_as_none")]
+    pub psnr: f64,
+    /// Mean SSIM over its frames; none if nobody asked.
+    pub ssim: Option<f64>,
+    /// Number of frames.
+    pub frames: usize,
+}
 
 /// Poses, renders and scores an avatar on every frame of some sequences, by the default protocol. Binding it costs more than
 /// drawing a few frames: sequences that share a body share the bound avatar.
@@ -26,63 +41,72 @@ pub fn held_out<'a>(
     iteration: u32,
     ssim: bool,
 ) -> Result<Vec<HeldOut>, Error> {
-    let fitted = fitted.into();
-    let mut bound: Option<(&Arc<RestBody>, BoundAvatar)> = None;
+    let Fitted { avatar, mesh } = fitted.into();
+    let protocol = Protocol::parse("default")?;
+    let mut bound: Option<(&Arc<RestBody>, Drawable<'_>)> = None;
     let mut scores = Vec::with_capacity(sequences.len());
     for sequence in sequences {
-        let (_, bound) = match bound.take_if(|(body, _)| Arc::ptr_eq(body, &sequence.body)) {
+        let (_, drawable) = match bound.take_if(|(body, _)| Arc::ptr_eq(body, &sequence.body)) {
             Some(same) => bound.insert(same),
             None => {
-                let fresh = BoundAvatar::new(fitted.avatar, &sequence.body)?.without_zero_bands();
+                let fresh = Drawable::new(avatar, mesh.map(Cow::Borrowed), &sequence.body)?;
                 bound.insert((&sequence.body, fresh))
             }
         };
-        scores.push(of_sequence(bound, fitted.mesh, strategy, sequence, Asked { iteration, ssim })?);
+        let (psnr, ssim) = of_sequence(drawable, strategy, &protocol, sequence, ssim)?;
+        let (id, frames) = (sequence.id.clone(), sequence.frames.len());
+        scores.push(HeldOut { iteration, sequence: id, psnr, ssim, frames });
     }
     Ok(scores)
 }
 
-/// What is said of a sequence.
-#[derive(Clone, Copy)]
-struct Asked {
-    iteration: u32,
-    ssim: bool,
-}
-
+/// Mean PSNR and SSIM over the frames of a sequence.
 fn of_sequence(
-    bound: &BoundAvatar,
-    mesh: Option<&TexturedBody>,
+    drawable: &Drawable<'_>,
     strategy: &Strategy,
+    protocol: &Protocol,
     sequence: &Sequence,
-    asked: Asked,
-) -> Result<HeldOut, Error> {
-    let protocol = Protocol::parse("default")?;
+    ssim: bool,
+) -> Result<(f64, Option<f64>), Error> {
     let background = protocol.background_colour().unwrap_or([1.0; 3]);
-    let read = bound.joints_read(strategy);
-    let score = |renderer: &mut Renderer, index: usize| {
-        let truth = sequence.truth(index)?;
-        let frame = &sequence.frames[index];
-        let (pose, camera) = (&sequence.poses[frame.pose], &sequence.cameras[frame.camera]);
-        let body = PosedBody::with_rotations(&sequence.body, pose, |joint| read[joint])?;
-        let mut poser = Poser::new();
-        let options = PoseOptions { seen_by: Some(camera), ..PoseOptions::default() };
-        let posed = poser.pose(bound, &body, strategy, &options)?;
-        let view = View::new(camera).over(background);
-        let image = match mesh {
-            None => renderer.render(&posed, &view)?.image.clone(),
-            Some(mesh) => together(renderer, &posed, (mesh, pose), view)?,
-        };
-        let truth = skinsplat_metrics::Truth::Straight { rgb: &truth.rgb, alpha: &truth.alpha };
-        Ok(protocol.score_with(&image, truth, Wanted { ssim: asked.ssim, lpips: None })?)
+    let look = Look { strategy: Some(*strategy), background, antialiased: false };
+    let read = drawable.joints_read(strategy);
+    let score = |scratch: &mut Scratch, index: usize| {
+        let frame = Frame::load(sequence, index, read.as_deref())?;
+        Ok(frame.evaluate(drawable, &look, protocol, Wanted { ssim, lpips: None }, scratch)?.score)
     };
     let frames = (0..sequence.frames.len()).into_par_iter();
-    let scores = frames.map_init(Renderer::new, score).collect::<Result<Vec<_>, Error>>()?;
+    let scores = frames.map_init(Scratch::default, score).collect::<Result<Vec<_>, Error>>()?;
     let summary = protocol.aggregate(&scores)?;
-    Ok(HeldOut {
-        iteration: asked.iteration,
-        sequence: sequence.id.clone(),
-        psnr: summary.psnr,
-        ssim: summary.ssim,
-        frames: scores.len(),
-    })
+    Ok((summary.psnr, summary.ssim))
+}
+
+/// +inf as none, in text and in binary.
+mod infinity_as_none {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    pub(super) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        value.is_finite().then_some(*value).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_score_that_is_infinite_is_read_back_from_every_document() {
+        for psnr in [f64::INFINITY, 31.25] {
+            let score = HeldOut { iteration: 3, sequence: "test".into(), psnr, ssim: None, frames: 1 };
+            let text = serde_json::to_string(&score).unwrap();
+            assert_eq!(serde_json::from_str::<HeldOut>(&text).unwrap(), score, "{text}");
+            let bytes = postcard::to_stdvec(&score).unwrap();
+            assert_eq!(postcard::from_bytes::<HeldOut>(&bytes).unwrap(), score);
+        }
+    }
 }

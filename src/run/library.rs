@@ -1,9 +1,12 @@
 //! The data at hand: loaded subjects, and what the planner needs to know about them.
 
 use super::Error;
-use crate::experiment::{Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
+use super::drawable::Drawable;
+use crate::experiment::{AvatarFile, AvatarState, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
 use rayon::prelude::*;
+use skinsplat_data::avatar::read_avatar;
 use skinsplat_data::{Sequence, Subject};
+use std::path::{Path, PathBuf};
 
 /// A data set whose subjects are loaded; no image is decoded.
 #[derive(Debug)]
@@ -14,6 +17,27 @@ pub struct LoadedDataset {
     pub title: String,
     /// Its subjects.
     pub subjects: Vec<Subject>,
+    /// Avatars that somebody else made of them.
+    pub avatars: Vec<RegisteredAvatar>,
+}
+
+/// Avatars that somebody else made, one per subject.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RegisteredAvatar {
+    /// Name that experiments use.
+    pub name: String,
+    /// Where they are; `{subject}` stands for the id of the subject.
+    pub path: PathBuf,
+}
+
+impl RegisteredAvatar {
+    /// Where the avatar of a subject is.
+    pub fn of_subject(&self, subject: &str) -> PathBuf {
+        match self.path.to_str() {
+            Some(path) => path.replace("{subject}", subject).into(),
+            None => self.path.clone(),
+        }
+    }
 }
 
 /// Every data set of a run.
@@ -28,13 +52,20 @@ impl Library {
         Self { datasets }
     }
 
-    /// What the planner needs: names, counts and content digests. Reads every file once, to digest it.
+    /// Registers an avatar of every subject, besides those of its data set.
+    pub fn register(&mut self, avatar: &RegisteredAvatar) {
+        self.datasets.iter_mut().for_each(|dataset| dataset.avatars.push(avatar.clone()));
+    }
+
+    /// What the planner needs: names, counts and content digests. Reads every file once, to digest it, and binds every
+    /// registered avatar to its subject's body: one that cannot be bound is described as such, with the reason.
     ///
     /// # Errors
     /// A file that cannot be read.
     pub fn describe(&self) -> Result<Vec<Dataset>, Error> {
         let describe = |dataset: &LoadedDataset| {
-            let subjects = dataset.subjects.iter().map(describe_subject).collect::<Result<_, _>>()?;
+            let describe = |subject| describe_subject(subject, &dataset.avatars);
+            let subjects = dataset.subjects.iter().map(describe).collect::<Result<_, _>>()?;
             Ok(Dataset { id: dataset.id.clone(), title: dataset.title.clone(), subjects })
         };
         self.datasets.iter().map(describe).collect()
@@ -53,7 +84,10 @@ impl Library {
     }
 }
 
-fn describe_subject(subject: &Subject) -> Result<SubjectInfo, skinsplat_data::Error> {
+fn describe_subject(
+    subject: &Subject,
+    avatars: &[RegisteredAvatar],
+) -> Result<SubjectInfo, skinsplat_data::Error> {
     let roles =
         subject.train.iter().map(|s| (s, Role::Train)).chain(subject.test.iter().map(|s| (s, Role::Test)));
     let sequences: Vec<(&Sequence, Role)> = roles.collect();
@@ -65,5 +99,25 @@ fn describe_subject(subject: &Subject) -> Result<SubjectInfo, skinsplat_data::Er
         Ok(SequenceInfo { id: sequence.id.clone(), role, digest, frames })
     };
     let sequences = sequences.par_iter().map(describe).collect::<Result<_, skinsplat_data::Error>>()?;
-    Ok(SubjectInfo { id: subject.id.clone(), capture: subject.capture, sequences, avatars: Vec::new() })
+    let avatars = avatars.iter().map(|avatar| describe_avatar(avatar, subject)).collect();
+    Ok(SubjectInfo { id: subject.id.clone(), capture: subject.capture, sequences, avatars })
+}
+
+/// What is where the avatar of a subject should be.
+fn describe_avatar(avatar: &RegisteredAvatar, subject: &Subject) -> AvatarFile {
+    let path = avatar.of_subject(&subject.id);
+    let state = match path.exists() {
+        false => AvatarState::Absent,
+        true => {
+            present(&path, subject).unwrap_or_else(|error| AvatarState::Broken { problem: error.to_string() })
+        }
+    };
+    AvatarFile { name: avatar.name.clone(), path, state }
+}
+
+fn present(path: &Path, subject: &Subject) -> Result<AvatarState, Error> {
+    let no_body = || Error::Absent { name: format!("{}: a sequence with a body", subject.id) };
+    let body = &subject.sequences().next().ok_or_else(no_body)?.body;
+    let (_, notes) = Drawable::read(path, body)?;
+    Ok(AvatarState::Present { digest: read_avatar(path)?.digest()?, notes })
 }

@@ -1,14 +1,21 @@
 //! Executing a plan and keeping what comes out.
 //!
-//! [`Library`] holds the data at hand, [`avatars`] makes what is to be posed, [`execute()`] walks the frames, [`store`]
-//! remembers every record by its content key, [`gallery`] shows where the variants differ.
+//! [`Library`] holds the data at hand, `avatars` makes or reads what is to be drawn, a
+//! [`Drawable`](drawable::Drawable); `frame` is where one is drawn in a pose and scored. [`execute()`] walks the frames,
+//! [`store`] remembers every record by its content key, [`gallery`] shows where the variants differ.
+//!
+//! Each file imports only from those before it in this list: `textured`, `foreign`, `drawable`, `library`, `frame`,
+//! `held_out`, `cache`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`.
 
-pub mod avatars;
+mod avatars;
+pub mod cache;
 mod curve_frames;
 pub mod curves;
+pub mod drawable;
 mod error;
 mod execute;
 pub mod fitting;
+pub mod foreign;
 mod frame;
 pub mod gallery;
 pub mod held_out;
@@ -19,4 +26,4 @@ pub mod textured;
 
 pub use error::Error;
 pub use execute::{Event, execute};
-pub use library::{Library, LoadedDataset};
+pub use library::{Library, LoadedDataset, RegisteredAvatar};

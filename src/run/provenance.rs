@@ -14,7 +14,7 @@ pub struct Provenance {
     pub simd: String,
     /// Threads that computed.
     pub threads: usize,
-    /// The command line.
+    /// The command line; what is no Unicode in it is replaced by U+FFFD.
     pub arguments: Vec<String>,
     /// Digest of the plan.
     pub plan: String,
@@ -46,7 +46,7 @@ impl Provenance {
                 .name()
                 .to_owned(),
             threads: rayon::current_num_threads(),
-            arguments: std::env::args().collect(),
+            arguments: std::env::args_os().map(|text| text.to_string_lossy().into_owned()).collect(),
             plan: plan.to_owned(),
             started_unix: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_secs()),
             seconds: 0.0,

@@ -3,6 +3,7 @@
 use super::Error;
 use glam::DVec3;
 use skinsplat_core::scene::RestBody;
+use skinsplat_data::avatar::mesh_beside;
 use skinsplat_data::{frames, npy};
 use skinsplat_fit::texture::TexturedBody;
 use skinsplat_render::mesh::Texture;
@@ -19,6 +20,12 @@ pub struct TexturedFiles {
 }
 
 impl TexturedFiles {
+    /// The mesh of a hybrid, beside the PLY of its Gaussians.
+    pub fn beside(avatar: &Path) -> Self {
+        let [texture, vertices] = mesh_beside(avatar);
+        Self { texture, vertices }
+    }
+
     /// True if all of them are there.
     pub fn exist(&self) -> bool {
         self.texture.is_file() && self.vertices.is_file()

@@ -1,8 +1,8 @@
 //! Made-up data sets, experiments and scores.
 
 use skinsplat::experiment::{
-    AvatarFile, Dataset, Experiment, FrameInfo, FrameRecord, Options, Outcome, Plan, Profile, Records, Role,
-    Seconds, SequenceInfo, SubjectInfo, Subset, plan,
+    AvatarFile, AvatarState, Dataset, Experiment, FrameInfo, FrameRecord, Options, Outcome, Plan, Profile,
+    Records, Role, Seconds, SequenceInfo, SubjectInfo, Subset, plan,
 };
 use skinsplat::report::{self, Results, TableResults};
 use skinsplat_data::Capture;
@@ -50,10 +50,17 @@ pub(super) fn own_data(test_frames: usize) -> Dataset {
         let train = sequence(&format!("{id}-train"), Role::Train, 20);
         let test = sequence(&format!("{id}-test"), Role::Test, test_frames);
         let mut person = subject(id, Capture::Monocular, vec![train, test]);
-        person.avatars.push(AvatarFile { name: "fitted".into(), digest: format!("fitted {id}") });
+        person.avatars.push(fitted_file(id));
         person
     };
     Dataset { id: "gymnasts".into(), title: "Gymnasts".into(), subjects: vec![person("anna"), person("bob")] }
+}
+
+/// The file of a subject's fitted avatar.
+pub(super) fn fitted_file(subject: &str) -> AvatarFile {
+    let digest = format!("{subject:f<64}");
+    let state = AvatarState::Present { digest, notes: Vec::new() };
+    AvatarFile { name: "fitted".into(), path: format!("avatars/{subject}.ply").into(), state }
 }
 
 /// Data that may stand in: one subject of each kind of capture.
@@ -103,7 +110,7 @@ pub(super) fn run(plan: &Plan) -> Records {
         for variant in &job.variants {
             let v = plan.tables[job.table].variants.iter().position(|id| *id == variant.id).unwrap() as f64;
             let psnr = 20.0 + job.row as f64 + v / 2.0 + job.frame as f64 / 10.0;
-            let score = score(&job.protocol, psnr, 0.9 + psnr / 1000.0, Some(0.2 - psnr / 1000.0));
+            let score = score(&job.protocol.id, psnr, 0.9 + psnr / 1000.0, Some(0.2 - psnr / 1000.0));
             records.insert(variant.key.clone(), scored(&variant.key, score));
         }
     }

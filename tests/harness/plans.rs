@@ -2,7 +2,8 @@
 
 use super::made_up::{figures, options, own_data, sequence, subject, table_7};
 use skinsplat::experiment::{
-    AvatarRecipe, Dataset, Experiment, Options, Plan, Profile, Role, Shard, Source, Subset, plan,
+    AvatarRecipe, AvatarSource, AvatarState, Dataset, Experiment, Options, Plan, PlannedAvatar, Profile,
+    Role, Shard, Source, Subset, TrainingFrames, plan,
 };
 use skinsplat_data::Capture;
 use skinsplat_data::key::canonical_json;
@@ -10,6 +11,11 @@ use std::collections::BTreeSet;
 
 fn planned(experiments: &[Experiment], datasets: &[Dataset]) -> Plan {
     plan(experiments, datasets, &options()).unwrap()
+}
+
+/// The training frames of the first avatar.
+fn training(plan: &Plan) -> &TrainingFrames {
+    plan.avatars[0].training().unwrap()
 }
 
 fn keys(plan: &Plan) -> Vec<&str> {
@@ -38,7 +44,7 @@ fn own_data_wins_over_stand_ins_and_frames_are_in_order() {
     let names = ["image_0000", "image_0001", "image_0002"];
     let expected: Vec<(usize, &str)> = (0..2).flat_map(|row| names.map(|name| (row, name))).collect();
     assert_eq!(frames, expected);
-    assert!(plan.jobs.iter().all(|job| job.variants.len() == 2 && job.protocol == "avatar-v1"));
+    assert!(plan.jobs.iter().all(|job| job.variants.len() == 2 && job.protocol.id == "avatar-v1"));
 }
 
 #[test]
@@ -66,9 +72,9 @@ fn avatars_are_shared_by_tables_that_make_the_same_ones() {
         .avatars
         .iter()
         .map(|avatar| {
-            let recipe = match &avatar.recipe {
-                AvatarRecipe::Fit { name, .. } => name,
-                AvatarRecipe::TexturedMesh { .. } => "mesh",
+            let recipe = match &avatar.source {
+                AvatarSource::Fit { fit, .. } => fit.options.recipe.id.as_str(),
+                AvatarSource::Textured { .. } => "mesh",
                 other => panic!("{other:?}"),
             };
             (avatar.subject.as_str(), recipe)
@@ -93,8 +99,11 @@ fn avatars_are_shared_by_tables_that_make_the_same_ones() {
             ("hands", "pure-skinned"),
         ]
     );
-    let starts: BTreeSet<&str> =
-        plan.avatars.iter().filter_map(|avatar| Some(avatar.fit.as_ref()?.start.as_str())).collect();
+    let start = |avatar: &'_ PlannedAvatar| match &avatar.source {
+        AvatarSource::Fit { fit, .. } => Some(fit.start.clone()),
+        _ => None,
+    };
+    let starts: BTreeSet<String> = plan.avatars.iter().filter_map(start).collect();
     assert_eq!(
         starts.len(),
         5,
@@ -213,8 +222,8 @@ fn profiles_thin_frames_evenly() {
     let plan = plan(&[table_7()], &[own_data(10)], &Options { profile, ..options() }).unwrap();
     let frames: Vec<usize> = plan.jobs.iter().map(|job| job.frame).collect();
     assert_eq!(frames, [2, 7, 2, 7]);
-    assert_eq!(plan.avatars[0].frames, [2, 7, 12, 17]);
-    assert_eq!(plan.avatars[0].sequence.as_deref(), Some("anna-train"));
+    assert_eq!(training(&plan).frames, [2, 7, 12, 17]);
+    assert_eq!(training(&plan).sequence, "anna-train");
 }
 
 /// One sequence that an experiment splits by frame number and camera, as PeopleSnapshot and GalaBasketball are.
@@ -226,7 +235,7 @@ fn splits_cut_whole_sequences() {
     let data =
         Dataset { id: "peoplesnapshot".into(), title: "PeopleSnapshot".into(), subjects: vec![person] };
     let plan = planned(&experiments[1..2], &[data]);
-    assert_eq!((plan.jobs.len(), plan.avatars[0].frames.len()), (55, 19));
+    assert_eq!((plan.jobs.len(), training(&plan).frames.len()), (55, 19));
     assert_eq!((plan.jobs[0].frame, plan.jobs[54].frame), (456, 672));
     let missing: Vec<&str> =
         plan.tables[0].rows[1..].iter().map(|row| row.missing.as_deref().unwrap()).collect();
@@ -244,7 +253,7 @@ fn splits_cut_whole_sequences() {
     let ball = subject("dribble", Capture::Multiview, vec![whole]);
     let data = Dataset { id: "galabasketball".into(), title: "GalaBasketball".into(), subjects: vec![ball] };
     let plan = planned(&experiments[3..4], &[data]);
-    assert_eq!((plan.jobs.len(), plan.avatars[0].frames.len()), (30, 180));
+    assert_eq!((plan.jobs.len(), training(&plan).frames.len()), (30, 180));
     assert_eq!(plan.jobs[0].frame, 6 * 60);
     assert_eq!(plan.tables[0].protocol.id, "animatable-gala");
 
@@ -253,29 +262,82 @@ fn splits_cut_whole_sequences() {
     let data = Dataset { id: "xhumans".into(), title: "X-Humans".into(), subjects: vec![hands] };
     let plan = planned(&experiments[5..], &[data]);
     assert_eq!(plan.tables[0].rows[0].sequence, "train/Take6");
-    assert_eq!(plan.avatars[0].sequence.as_deref(), Some("train/Take4"));
+    assert_eq!(training(&plan).sequence, "train/Take4");
+}
+
+/// The seventh table with a file as the avatar of its first variant.
+fn with_file(name: &str, otherwise: Option<&str>) -> Experiment {
+    let mut experiment = table_7();
+    let otherwise = otherwise.map(str::to_owned);
+    experiment.variants[0].avatar = AvatarRecipe::File { name: name.into(), otherwise };
+    experiment.variants[0].sh_degree = None;
+    experiment
+}
+
+fn refusal(experiment: Experiment, data: Dataset) -> String {
+    plan(&[experiment], &[data], &options()).unwrap_err().to_string()
 }
 
 #[test]
 fn fitted_avatars_come_by_name() {
-    let mut experiment = table_7();
-    experiment.variants[0].avatar = AvatarRecipe::File { name: "fitted".into() };
-    experiment.variants[0].sh_degree = None;
-    let plan = planned(&[experiment.clone()], &[own_data(2)]);
-    assert_eq!((plan.avatars[0].sequence.as_deref(), plan.avatars[0].frames.len()), (None, 0));
-    experiment.variants[0].avatar = AvatarRecipe::File { name: "other".into() };
-    let error =
-        skinsplat::experiment::plan(&[experiment], &[own_data(2)], &options()).unwrap_err().to_string();
+    let planned_file = planned(&[with_file("fitted", None)], &[own_data(2)]);
+    let AvatarSource::File { name, digest, sequence, .. } = &planned_file.avatars[0].source else { panic!() };
+    assert_eq!((name.as_str(), &digest[..6], sequence.as_str()), ("fitted", "annaff", "anna-train"));
+    assert!(planned_file.avatars[0].training().is_none());
+    let error = refusal(with_file("other", None), own_data(2));
     assert!(
-        error.contains(
-            "variants[0].avatar: gymnasts/anna has no avatar `other`; expected one of those it has: fitted"
-        ),
+        error.contains("variants[0].avatar: variant matrices: gymnasts/anna has no avatar `other`; expected")
+            && error.contains("registered: fitted"),
         "{error}"
     );
     let mut data = own_data(2);
     data.subjects[1].sequences.remove(0);
-    let error = skinsplat::experiment::plan(&[table_7()], &[data], &options()).unwrap_err().to_string();
+    let error = refusal(table_7(), data);
     assert!(error.contains("gymnasts/bob has no training sequence"), "{error}");
+}
+
+#[test]
+fn the_content_of_a_file_is_in_its_key_and_its_place_is_not() {
+    let key = |data: Dataset| planned(&[with_file("fitted", None)], &[data]).avatars[0].key.clone();
+    let mut moved = own_data(2);
+    moved.subjects[0].avatars[0].path = "elsewhere.ply".into();
+    assert_eq!(key(moved), key(own_data(2)));
+    let mut other = own_data(2);
+    let AvatarState::Present { digest, .. } = &mut other.subjects[0].avatars[0].state else { panic!() };
+    digest.replace_range(..1, "0");
+    assert_ne!(key(other), key(own_data(2)));
+    let mut body = own_data(2);
+    body.subjects[0].sequences[0].digest += "!";
+    assert_ne!(key(body), key(own_data(2)), "the body that it is bound to");
+}
+
+#[test]
+fn a_file_that_is_missing_or_broken_is_named_unless_a_fit_replaces_it() {
+    let with = |state: AvatarState| {
+        let mut data = own_data(2);
+        data.subjects[1].avatars[0].state = state;
+        data
+    };
+    let error = refusal(with_file("fitted", None), with(AvatarState::Absent));
+    for part in ["variants[0].avatar", "variant matrices", "gymnasts/bob", "avatars/bob.ply", "otherwise"] {
+        assert!(error.contains(part), "no `{part}` in {error}");
+    }
+    let broken = AvatarState::Broken { problem: "bob.ply: joint[3]: 99; expected less".into() };
+    let error = refusal(with_file("fitted", Some("hugs-skinned")), with(broken));
+    assert!(error.contains("gymnasts/bob: bob.ply: joint[3]: 99; expected less"), "{error}");
+    let plan = planned(&[with_file("fitted", Some("hugs-skinned"))], &[with(AvatarState::Absent)]);
+    let of = |subject: &str| {
+        let avatar = plan.avatars.iter().find(|avatar| avatar.subject == subject).unwrap();
+        avatar.training().is_some()
+    };
+    assert_eq!((of("anna"), of("bob")), (false, true));
+    let mut fitted = table_7();
+    fitted.variants[0].avatar = AvatarRecipe::Fit { name: "hugs-skinned".into(), seed: 0 };
+    fitted.variants[0].sh_degree = None;
+    let fitted = planned(&[fitted], &[own_data(2)]);
+    assert_eq!(keys(&plan).last(), keys(&planned(&[with_file("fitted", None)], &[own_data(2)])).last());
+    let key = |plan: &Plan| plan.jobs[2].variants[0].key.clone();
+    assert_eq!(key(&plan), key(&fitted), "fitted as any other");
 }
 
 #[test]

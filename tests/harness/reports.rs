@@ -234,7 +234,7 @@ fn seeds_are_one_row_with_a_spread() {
         let mut records = Records::new();
         for job in &plan.jobs {
             for (variant, psnr) in job.variants.iter().zip([30.0, 31.0, 32.0, 35.0]) {
-                let score = score(&job.protocol, psnr, 0.9, Some(0.1));
+                let score = score(&job.protocol.id, psnr, 0.9, Some(0.1));
                 records.insert(variant.key.clone(), scored(&variant.key, score));
             }
         }

@@ -59,6 +59,8 @@ impl Desk {
         for name in ["SLURM_CPUS_PER_TASK", "COLUMNS", "RUST_BACKTRACE", "REPRODUCE_LPIPS_WEIGHTS"] {
             command.env_remove(name);
         }
+        // The data of this repository, wherever the desk is.
+        command.env("REPRODUCE_DATASETS", concat!(env!("CARGO_MANIFEST_DIR"), "/datasets.toml"));
         command
     }
 
@@ -93,6 +95,20 @@ pub fn contents(folder: &Path) -> Vec<(PathBuf, Option<Vec<u8>>)> {
     }
     found.sort();
     found
+}
+
+/// Copies a folder and all that is in it.
+pub fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).unwrap();
+        }
+    }
 }
 
 impl Answer {

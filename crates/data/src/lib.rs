@@ -8,6 +8,7 @@
 //!
 //! | module | formats |
 //! |---|---|
+//! | [`avatar`] | avatars whoever made them: tells the formats apart |
 //! | [`ply`] | 3DGS avatars, with their binding in extra properties |
 //! | [`splatting_avatar`] | avatars that SplattingAvatar exports |
 //! | [`body`], [`gltf`] | SMPL-style `.npz`, skinned glTF 2.0 |
@@ -21,6 +22,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 pub mod atomic;
+pub mod avatar;
 pub mod body;
 pub mod camera;
 mod capture;

@@ -9,7 +9,18 @@ use glam::DVec3;
 use serde::Deserialize;
 use skinsplat_core::scene::body::vertex_normals;
 use skinsplat_core::scene::{Avatar, Binding, FaceBinding};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Name of the file of the Gaussians.
+pub const GAUSSIANS: &str = "point_cloud.ply";
+/// Name of the file that binds them.
+const EMBEDDING: &str = "embedding.json";
+
+/// True if a PLY of Gaussians has the embedding of an export beside it.
+pub fn is_export(point_cloud: &Path) -> bool {
+    point_cloud.file_name().is_some_and(|name| name == GAUSSIANS)
+        && point_cloud.with_file_name(EMBEDDING).is_file()
+}
 
 /// An exported avatar and the mesh that it is canonical on.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +31,8 @@ pub struct Exported {
     pub vertices: Vec<DVec3>,
     /// Triangles of the canonical mesh, in the body model's order.
     pub faces: Vec<[u32; 3]>,
+    /// The three files: Gaussians, embedding, mesh.
+    pub files: Vec<PathBuf>,
 }
 
 #[derive(Deserialize)]
@@ -39,7 +52,7 @@ struct Embedding {
 /// Missing or inconsistent files, faces outside the mesh, whatever [`Avatar::validate`] refuses.
 pub fn load(point_cloud: &Path) -> Result<Exported, Error> {
     let mut avatar = ply::read_avatar(point_cloud)?;
-    let path = point_cloud.with_file_name("embedding.json");
+    let path = point_cloud.with_file_name(EMBEDDING);
     let embedding: Embedding =
         error::read_json(&path, "embedding", "cano_mesh, sample_fidxs, sample_bary, _xyz, _rotation")?;
     let n = avatar.gaussians.len();
@@ -58,7 +71,8 @@ pub fn load(point_cloud: &Path) -> Result<Exported, Error> {
         ));
     }
     let mesh_name = Path::new(&embedding.cano_mesh).file_name().unwrap_or("embedding.obj".as_ref());
-    let (vertices, faces) = read_obj(&path.with_file_name(mesh_name))?;
+    let mesh = path.with_file_name(mesh_name);
+    let (vertices, faces) = read_obj(&mesh)?;
     let normals = vertex_normals(&vertices, &faces);
     for i in 0..n {
         let face = embedding.sample_fidxs[i];
@@ -83,7 +97,7 @@ pub fn load(point_cloud: &Path) -> Result<Exported, Error> {
         offsets: embedding.xyz.iter().map(|xyz| xyz[2]).collect(),
     });
     avatar.validate(None).map_err(|e| Error::scene(&path, e))?;
-    Ok(Exported { avatar, vertices, faces })
+    Ok(Exported { avatar, vertices, faces, files: vec![point_cloud.to_owned(), path, mesh] })
 }
 
 /// Vertices and triangles of a Wavefront OBJ file; everything else in it is skipped.

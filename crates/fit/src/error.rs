@@ -40,6 +40,12 @@ pub enum Error {
         /// What is not finite.
         parameter: String,
     },
+    /// A checkpoint that is none of this fit.
+    #[error("checkpoint: {problem}")]
+    Checkpoint {
+        /// What is wrong with it, and what was expected.
+        problem: String,
+    },
     /// A setting out of its range, or data that cannot give an avatar.
     #[error("{field}: {problem}; expected {expected}")]
     Invalid {

@@ -22,7 +22,6 @@ use serde::{Deserialize, Serialize};
 use skinsplat_core::math::portable;
 use skinsplat_core::scene::RestBody;
 use skinsplat_data::sequence::Sequence;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use surface::Surface;
 use views::{Cache, View};
@@ -112,26 +111,11 @@ impl Default for ShapeOptions {
     }
 }
 
-/// Where a fit is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ShapeProgress {
-    /// The step just made, from zero.
-    pub iteration: usize,
-    /// How many there will be.
-    pub iterations: usize,
-    /// The objective before the step.
-    pub loss: f64,
-    /// Mean soft intersection over union of the step's frames.
-    pub iou: f64,
-}
-
 /// Why a fit ended.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Ended {
     /// All steps were made.
     Finished,
-    /// The caller asked for it.
-    Stopped,
     /// A loss or a gradient was not finite; the shape is that of the step before.
     NotFinite {
         /// The step.
@@ -156,23 +140,19 @@ pub struct FittedShape {
     pub ended: Ended,
 }
 
-/// Fits the shape of a sequence's body to its masks. `progress` is called after every step and may end the fit.
+/// Fits the shape of a sequence's body to its masks.
 ///
 /// # Errors
 /// A setting out of range, a sequence without frames, a body without faces or that breaks an invariant, a frame that
 /// cannot be read, no frame whose mask says anything about the shape.
-pub fn fit_shape(
-    sequence: &Sequence,
-    settings: &ShapeFit,
-    progress: &mut dyn FnMut(ShapeProgress) -> ControlFlow<()>,
-) -> Result<FittedShape, Error> {
+pub fn fit_shape(sequence: &Sequence, settings: &ShapeFit) -> Result<FittedShape, Error> {
     let ShapeFit { clothing, sighting, options, .. } = settings;
     sighting.check("sighting")?;
     options.check("")?;
     let training = training::prepared(sequence, usize::MAX)?.reduced(options.longest_side);
     let start = clothing::offsets_from_outlines(&training, clothing, sighting)?;
     let (surface, start) = Surface::new(&training.body, &start).map_err(Error::scene(&training))?;
-    Fit::new(&training, settings, &surface, start).run(progress)
+    Fit::new(&training, settings, &surface, start).run()
 }
 
 impl ShapeOptions {
@@ -240,10 +220,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    fn run(
-        mut self,
-        progress: &mut dyn FnMut(ShapeProgress) -> ControlFlow<()>,
-    ) -> Result<FittedShape, Error> {
+    fn run(mut self) -> Result<FittedShape, Error> {
         let Surface { body, normals, topology } = self.surface;
         let regularity = Regularity::new(topology, &body.vertices, normals);
         let diffusion = Diffusion::new(body.vertices.len(), &body.faces, self.settings.options.smoothing);
@@ -272,12 +249,6 @@ impl<'a> Fit<'a> {
                 break;
             }
             curve.push((iteration, step.loss, step.iou));
-            let iterations = self.settings.iterations;
-            let now = ShapeProgress { iteration, iterations, loss: step.loss, iou: step.iou };
-            if progress(now).is_break() {
-                ended = Ended::Stopped;
-                break;
-            }
         }
         let offsets: Vec<f32> = self.offsets(&diffusion, &parameters).into_iter().map(|o| o as f32).collect();
         let body = body.clone().with_normal_offset(&offsets).map_err(Error::scene(self.sequence))?;

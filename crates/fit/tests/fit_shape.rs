@@ -6,11 +6,10 @@ use skinsplat_core::scene::{Camera, Image, Mask, Pose, PosedBody, RestBody, Skel
 use skinsplat_data::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
 use skinsplat_fit::Error;
 use skinsplat_fit::options::Clothing;
-use skinsplat_fit::shape::{Ended, FittedShape, ShapeFit, ShapeOptions, ShapeProgress, fit_shape};
+use skinsplat_fit::shape::{Ended, FittedShape, ShapeFit, ShapeOptions, fit_shape};
 use skinsplat_fit::subdivide::Subdivided;
 use skinsplat_render::mesh::{Mesh, SamplePattern, silhouette};
 use std::f64::consts::{PI, TAU};
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 const RADIUS: f64 = 0.3;
@@ -129,7 +128,7 @@ fn brief() -> ShapeFit {
 }
 
 fn fitted(sequence: &Sequence, settings: &ShapeFit) -> Result<FittedShape, Error> {
-    fit_shape(sequence, settings, &mut |_| ControlFlow::Continue(()))
+    fit_shape(sequence, settings)
 }
 
 fn overlap(a: &Mask, b: &Mask) -> f64 {
@@ -189,22 +188,6 @@ fn the_shape_is_the_same_for_any_number_of_threads_and_another_for_another_seed(
         assert!(make(threads, &settings) == one, "{threads} threads");
     }
     assert_ne!(make(2, &ShapeFit { seed: 1, ..settings.clone() }).offsets, one.offsets);
-}
-
-#[test]
-fn progress_is_told_and_can_stop_the_fit() {
-    let body = limb(8);
-    let train = sequence(&body, &clothed(&body), &[0.0, 90.0], &[0.0]);
-    let mut seen: Vec<ShapeProgress> = Vec::new();
-    let shape = fit_shape(&train, &brief(), &mut |now| {
-        seen.push(now);
-        if now.iteration == 4 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })
-    .unwrap();
-    assert_eq!((seen.len(), seen[4].iterations, &shape.ended), (5, 120, &Ended::Stopped));
-    let told: Vec<_> = seen.iter().map(|now| (now.iteration, now.loss, now.iou)).collect();
-    assert_eq!(told, shape.curve);
-    assert!(shape.offsets.iter().any(|&o| o > 0.0), "what was found is kept");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use skinsplat_core::scene::{Avatar, Binding, Gaussians};
+use skinsplat_data::avatar::{Format, file_digest, mesh_beside, read_avatar};
 use skinsplat_data::ply::{self, Encoding, Metadata};
 use skinsplat_data::splatting_avatar;
 use std::path::Path;
@@ -63,4 +64,30 @@ fn what_is_wrong_with_an_export_is_named() {
         let error = splatting_avatar::load(&export(folder.path(), &embedding, &mesh)).unwrap_err();
         assert_eq!(error.field(), field, "{error}");
     }
+}
+
+#[test]
+fn formats_are_told_apart_by_what_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = export(folder.path(), EMBEDDING, MESH);
+    for place in [folder.path(), &path] {
+        let loaded = read_avatar(place).unwrap();
+        assert_eq!(
+            (loaded.format, loaded.is_bound(), loaded.files.len()),
+            (Format::SplattingAvatar, true, 3)
+        );
+        assert!(loaded.canonical.is_some() && loaded.notes.len() == 1);
+    }
+    let exported = read_avatar(&path).unwrap().digest().unwrap();
+    std::fs::remove_file(folder.path().join("embedding.json")).unwrap();
+    let plain = read_avatar(folder.path()).unwrap();
+    assert_eq!((plain.format, plain.is_bound(), &plain.files[..]), (Format::Ply, false, &[path.clone()][..]));
+    assert_eq!(plain.digest().unwrap(), file_digest(&path).unwrap(), "that of the one file");
+    assert_ne!(plain.digest().unwrap(), exported);
+    for part in mesh_beside(&path) {
+        std::fs::write(part, "x").unwrap();
+    }
+    assert_eq!(read_avatar(&path).unwrap().files.len(), 3, "the mesh of a hybrid belongs to it");
+    let error = read_avatar(tempfile::tempdir().unwrap().path()).unwrap_err().to_string();
+    assert!(error.contains("point_cloud.ply") && error.lines().count() == 1, "{error}");
 }

@@ -22,15 +22,15 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
+    /// The state of the fit with this [`key`].
     pub(super) fn new(
-        sequence: &Sequence,
-        options: &FitOptions,
+        key: String,
         parameters: Parameters,
         density: Density,
         layer: Option<State>,
         iteration: u32,
     ) -> Self {
-        Self { key: key(sequence, options), iteration, parameters, density, layer }
+        Self { key, iteration, parameters, density, layer }
     }
 
     /// Iterations done.
@@ -38,22 +38,21 @@ impl Checkpoint {
         self.iteration
     }
 
-    /// The checkpoint itself, if it belongs to this fit.
-    pub(super) fn matching(self, sequence: &Sequence, options: &FitOptions) -> Result<Self, Error> {
-        if self.key == key(sequence, options) {
+    /// The checkpoint itself, if it belongs to the fit with this [`key`].
+    pub(super) fn matching(self, key: &str) -> Result<Self, Error> {
+        if self.key == key {
             return Ok(self);
         }
-        let expected = "one of the same frames, recipe, iterations, seed and program version";
-        Err(Error::invalid("checkpoint", "it belongs to another fit", expected))
+        let expected = "one of the same training data, recipe, iterations, seed and program version";
+        Err(Error::Checkpoint { problem: format!("it belongs to another fit; expected {expected}") })
     }
 }
 
-/// What a checkpoint must agree with.
-fn key(sequence: &Sequence, options: &FitOptions) -> String {
+/// What a checkpoint must agree with: options, code, and the training data by their content. Reads every training image.
+pub(super) fn key(sequence: &Sequence, options: &FitOptions) -> Result<String, Error> {
     let frames: Vec<&str> = sequence.frames.iter().map(|frame| frame.name.as_str()).collect();
-    let sizes: Vec<[u32; 2]> = sequence.cameras.iter().map(|camera| [camera.width, camera.height]).collect();
     let code = [crate::CODE_VERSION, skinsplat_posing::CODE_VERSION, skinsplat_render::CODE_VERSION];
-    content_key(&serde_json::json!({
-        "code": code, "options": options, "sequence": sequence.id, "frames": frames, "sizes": sizes,
-    }))
+    Ok(content_key(&serde_json::json!({
+        "code": code, "options": options, "sequence": sequence.id, "frames": frames, "data": sequence.digest()?,
+    })))
 }

@@ -48,7 +48,7 @@ impl Layer {
     /// Goes on from a checkpoint.
     pub(super) fn resume(sequence: &Sequence, recipe: &MeshLayer, state: State) -> Result<Self, Error> {
         let State { vertices, texels, moments } = state;
-        let refuse = |error: SceneError| Error::invalid("checkpoint", error.to_string(), "a sound mesh");
+        let refuse = |error: SceneError| Error::Checkpoint { problem: error.to_string() };
         let side = recipe.texture as usize;
         let texture = Texture::new(Image::new(side, side, texels).map_err(refuse)?);
         let vertices: Vec<DVec3> = vertices.into_iter().map(Vec3::as_dvec3).collect();

@@ -39,8 +39,7 @@ use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
 use skinsplat_render::View;
 use skinsplat_render::mesh::Drawing;
 use skinsplat_render::splat::{Derivatives, Renderer};
-use std::ops::ControlFlow;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// What an iteration did.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -86,7 +85,18 @@ pub struct Trainer<'a> {
     faces: Option<NearestFace<'a>>,
     frames: TrainingFrames<'a>,
     warnings: Vec<String>,
+    /// [`checkpoint::key`], when it was first asked for.
+    key: OnceLock<String>,
     scratch: Scratch,
+}
+
+/// The avatar with which a fit starts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Started {
+    /// The Gaussians and their binding.
+    pub avatar: Avatar,
+    /// Frames from which its shape could not be learnt, and why.
+    pub warnings: Vec<String>,
 }
 
 /// Memory that is kept from iteration to iteration.
@@ -143,12 +153,12 @@ impl Starting {
 ///
 /// # Errors
 /// As [`surface_init`] and [`fit_shape`]; a shape fit that diverges.
-pub fn start(sequence: &Sequence, options: &FitOptions) -> Result<Avatar, Error> {
+pub fn start(sequence: &Sequence, options: &FitOptions) -> Result<Started, Error> {
     let Starting { init, shape } = Starting::of(options);
     match shape {
-        None => surface_init(sequence, &init),
+        None => Ok(Started { avatar: surface_init(sequence, &init)?, warnings: Vec::new() }),
         Some(settings) => {
-            let shape = fit_shape(sequence, &settings, &mut |_| ControlFlow::Continue(()))?;
+            let shape = fit_shape(sequence, &settings)?;
             if let Ended::NotFinite { iteration, frame } = shape.ended {
                 return Err(Error::Diverged {
                     sequence: sequence.id.clone(),
@@ -159,7 +169,9 @@ pub fn start(sequence: &Sequence, options: &FitOptions) -> Result<Avatar, Error>
             }
             let dressed = Sequence { body: Arc::new(shape.body), ..sequence.clone() };
             let clothing = Clothing { rounds: 0, ..init.clothing };
-            surface_init(&dressed, &SurfaceInit { clothing, ..init })
+            let avatar = surface_init(&dressed, &SurfaceInit { clothing, ..init })?;
+            let name = |warning: String| format!("{}: {warning}", sequence.id);
+            Ok(Started { avatar, warnings: shape.warnings.into_iter().map(name).collect() })
         }
     }
 }
@@ -193,13 +205,14 @@ impl<'a> Trainer<'a> {
         options: &'a FitOptions,
         checkpoint: Checkpoint,
     ) -> Result<Self, Error> {
-        let Checkpoint { parameters, density, layer, iteration, .. } =
-            checkpoint.matching(sequence, options)?;
+        let key = checkpoint::key(sequence, options)?;
+        let Checkpoint { parameters, density, layer, iteration, .. } = checkpoint.matching(&key)?;
         let layer = match (&options.recipe.mesh, layer) {
             (Some(mesh), Some(state)) => Some(Layer::resume(sequence, mesh, state)?),
             _ => None,
         };
-        Self::with_state(sequence, options, (parameters, density, layer), iteration)
+        let trainer = Self::with_state(sequence, options, (parameters, density, layer), iteration)?;
+        Ok(Self { key: OnceLock::from(key), ..trainer })
     }
 
     fn with_state(
@@ -231,6 +244,7 @@ impl<'a> Trainer<'a> {
             faces: NearestFace::new(&sequence.body),
             frames: TrainingFrames::new(sequence, options.seed),
             warnings: Vec::new(),
+            key: OnceLock::new(),
             scratch: Scratch::new(),
         })
     }
@@ -261,16 +275,21 @@ impl<'a> Trainer<'a> {
         std::mem::take(&mut self.warnings)
     }
 
-    /// Everything that a later [`Trainer::resume`] needs, at a moment that [`Trainer::is_resting`].
-    pub fn checkpoint(&self) -> Checkpoint {
-        Checkpoint::new(
-            self.sequence,
-            self.options,
-            self.parameters.clone(),
-            self.density.clone(),
-            self.layer.as_ref().map(Layer::state),
-            self.iteration,
-        )
+    /// Everything that a later [`Trainer::resume`] needs, at a moment that [`Trainer::is_resting`]. The first call digests
+    /// the training data.
+    ///
+    /// # Errors
+    /// A training image that cannot be read.
+    pub fn checkpoint(&self) -> Result<Checkpoint, Error> {
+        let key = match self.key.get() {
+            Some(key) => key.clone(),
+            None => {
+                let key = checkpoint::key(self.sequence, self.options)?;
+                self.key.get_or_init(|| key).clone()
+            }
+        };
+        let layer = self.layer.as_ref().map(Layer::state);
+        Ok(Checkpoint::new(key, self.parameters.clone(), self.density.clone(), layer, self.iteration))
     }
 
     /// One iteration.
