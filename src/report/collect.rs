@@ -47,7 +47,7 @@ fn table(
     });
     let sequences: Vec<SequenceResults> = sequences.collect::<Result<_, _>>()?;
     let mut made = build::table(experiment, planned, &plan.options, &sequences);
-    made.ran_on.extend(variants.iter().filter_map(|variant| avatar_file(plan, variant, jobs)));
+    made.sentences.extend(variants.iter().filter_map(|variant| avatar_file(plan, variant, jobs)));
     Ok(TableResults {
         experiment: experiment.id.clone(),
         version: experiment.version,

@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Any number of a recipe can be varied: what is fitted, learning rates, the loss.
     let recipe = Recipe::parse("hugs-skinned+loss.ssim=0.1")?;
     let options = FitOptions { recipe, iterations: 64, seed: 0, edge_mm: 15 };
-    let mut trainer = Trainer::new(sequence, &options, train::start(sequence, &options)?)?;
+    let mut trainer = Trainer::new(sequence, &options, train::start(sequence, &options)?.avatar)?;
     let mut steps: Vec<Step> = Vec::new();
     while !trainer.is_done() {
         steps.push(trainer.step()?);
