@@ -104,7 +104,7 @@ background; `captured` ones see white.
 
 {table}
 
-n/c: not computed; the protocol's LPIPS needs VGG-16 (`--lpips-weights`, see assets/README.md).
+n/c: not computed; the protocol's LPIPS needs VGG-16 (`--lpips-weights`, see crates/lpips-alex/README.md).
 
 | over the protocols | PSNR | SSIM | LPIPS |
 |---|---|---|---|
