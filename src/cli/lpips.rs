@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Networks for LPIPS.
 #[derive(Debug, clap::Args)]
 pub(super) struct LpipsWeights {
-    /// Weights of LPIPS (safetensors), for protocols that ask for VGG-16; AlexNet is built in. See assets/README.md
+    /// Weights of LPIPS (safetensors), for protocols that ask for VGG-16; AlexNet is built in. See crates/lpips-alex/README.md
     #[arg(long = "lpips-weights", value_name = "FILE", env = "REPRODUCE_LPIPS_WEIGHTS")]
     file: Option<PathBuf>,
 }

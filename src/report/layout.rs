@@ -117,7 +117,10 @@ fn wide(columns: &[experiment::Column], entries: Vec<Entry>) -> Shape {
     };
     Shape {
         labels: vec![Label::new("method", "Method")],
-        columns: groups.iter().flat_map(|&group| columns.iter().map(move |c| column(c).group(group))).collect(),
+        columns: groups
+            .iter()
+            .flat_map(|&group| columns.iter().map(move |c| column(c).group(group)))
+            .collect(),
         rows: lines.into_iter().map(row).collect(),
     }
 }
