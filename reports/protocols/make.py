@@ -78,19 +78,20 @@ def page(ours, stock):
     add("| protocol | PSNR | SSIM | LPIPS | background | region | SSIM variant | LPIPS variant | Δ PSNR | Δ SSIM | Δ LPIPS |")
     add("|---" * 11 + "|")
     for a, b in zip(ours, stock):
-        protocol, a, b = a["protocol"], a["scores"], b["scores"]
+        protocol, a, b = a["protocol"], a["scores"]["values"], b["scores"]["values"]
         background = protocol["background"]
         background = background if isinstance(background, str) else ",".join(f"{v:g}" for v in background)
         cells = [f"{protocol['id']}@{protocol['version']}"]
-        cells += [number(a[metric], digits) for metric, digits in METRICS]
+        cells += [number(a.get(metric), digits) for metric, digits in METRICS]
         cells += [background, protocol["region"], protocol["ssim"], protocol["lpips"]]
-        cells += [signed(a[metric], b[metric], digits) for metric, digits in METRICS]
+        cells += [signed(a.get(metric), b.get(metric), digits) for metric, digits in METRICS]
         add("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def span(rows, metric):
-    values = [row["scores"][metric] for row in rows if row["scores"][metric] is not None]
+    values = [row["scores"]["values"].get(metric) for row in rows]
+    values = [value for value in values if value is not None]
     return min(values), max(values), max(values) - min(values)
 
 

@@ -6,7 +6,7 @@ use super::output::{emit, table_format, written};
 use super::planning::known_experiments;
 use anyhow::Result;
 use skinsplat_fit::RECIPES;
-use skinsplat_metrics::{MetricKind, PROTOCOLS, SsimVariant, VARIANT_IDS};
+use skinsplat_metrics::{METRICS, Metric, PROTOCOLS, SsimVariant, VARIANT_IDS};
 use skinsplat_posing::PRESETS;
 use skinsplat_table::{Cell, Column, Label, Row, Table, text};
 
@@ -117,10 +117,11 @@ fn protocols() -> Table {
 }
 
 fn metrics() -> Table {
-    let kinds = MetricKind::ALL.map(|m| (m.id().to_owned(), [format!("table column {}", m.title())]));
+    let metric = |m: &Metric| (m.id.to_owned(), [format!("table column {}: {}", m.title, m.summary)]);
+    let kinds = METRICS.iter().map(metric);
     let ssims = SsimVariant::ALL.map(|s| (s.id().to_owned(), ["SSIM of a protocol".to_owned()]));
     let variants = VARIANT_IDS.iter().flat_map(|(region, ids)| {
         ids.iter().map(|id| ((*id).to_owned(), [format!("variant of `score`, region {}", region.id())]))
     });
-    listing("Metrics", [("what", "What")], kinds.into_iter().chain(ssims).chain(variants))
+    listing("Metrics", [("what", "What")], kinds.chain(ssims).chain(variants))
 }

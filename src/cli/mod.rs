@@ -20,6 +20,7 @@ mod score;
 mod selection;
 mod skin;
 mod stress;
+mod tolerances;
 mod trade;
 
 use clap::error::ErrorKind;

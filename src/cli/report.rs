@@ -1,8 +1,9 @@
 //! `reproduce report`: the tables of a run again, or against a baseline.
 
 use super::output::{emit, emit_json, table_format, written};
+use super::tolerances::ToleranceOptions;
 use super::{Context, Exit};
-use crate::report::compare::{Changes, Move, Tolerances, compare};
+use crate::report::compare::{Changes, Move, compare};
 use crate::report::{self, Results};
 use anyhow::{Context as _, Result, anyhow};
 use std::path::{Path, PathBuf};
@@ -24,15 +25,8 @@ pub(super) struct Report {
     /// Folder of an earlier run, or its results.json: print what moved
     #[arg(long, value_name = "RUN", help_heading = "Comparison")]
     baseline: Option<PathBuf>,
-    /// PSNR that may be lost, dB
-    #[arg(long, value_name = "DB", default_value_t = Tolerances::default().psnr, help_heading = "Comparison")]
-    tolerance_psnr: f64,
-    /// SSIM that may be lost
-    #[arg(long, value_name = "X", default_value_t = Tolerances::default().ssim, help_heading = "Comparison")]
-    tolerance_ssim: f64,
-    /// LPIPS that may be gained
-    #[arg(long, value_name = "X", default_value_t = Tolerances::default().lpips, help_heading = "Comparison")]
-    tolerance_lpips: f64,
+    #[command(flatten)]
+    tolerances: ToleranceOptions,
 }
 
 impl Report {
@@ -60,13 +54,7 @@ impl Report {
     }
 
     fn compare(&self, baseline: &Results, candidate: &Results, context: Context) -> Result<Exit> {
-        let tolerances = Tolerances {
-            psnr: self.tolerance_psnr,
-            ssim: self.tolerance_ssim,
-            lpips: self.tolerance_lpips,
-            ..Tolerances::default()
-        };
-        let changes = compare(baseline, candidate, &tolerances);
+        let changes = compare(baseline, candidate, &self.tolerances.0);
         match self.format.as_str() {
             "json" => emit_json(&changes)?,
             _ => emit(&text(&changes))?,

@@ -6,7 +6,7 @@
 //! depend on. A [`FrameRecord`] is what a job leaves behind. Nothing in this layer renders, and nothing reads a file
 //! but [`Experiment::load`] and [`Experiment::load_folder`].
 //!
-//! A further table is a further TOML file; a further column is one arm in [`MetricKind`](skinsplat_metrics::MetricKind).
+//! A further table is a further TOML file; a further column is a line in [`METRICS`](skinsplat_metrics::METRICS).
 
 mod avatar;
 mod catalog;

@@ -2,7 +2,7 @@
 
 use super::{FrameInfo, Role};
 use serde::{Deserialize, Serialize};
-use skinsplat_metrics::MetricKind;
+use skinsplat_metrics::MetricId;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -120,42 +120,30 @@ pub struct PaperVariant {
     pub label: String,
 }
 
-/// The printed numbers of one sequence and variant.
+/// The printed numbers of one sequence and variant. A key of the file that is no field is the name of a metric.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct PaperRow {
     /// Sequence (subject) as printed.
     pub sequence: String,
     /// Id of the variant.
     pub variant: String,
-    /// Peak signal-to-noise ratio, dB.
-    pub psnr: Option<Printed>,
-    /// Structural similarity.
-    pub ssim: Option<Printed>,
-    /// Learned perceptual distance.
-    pub lpips: Option<Printed>,
-    /// Number of Gaussians.
-    #[serde(default)]
-    pub splats: Option<Printed>,
     /// The metrics that are printed in bold.
-    pub bold: Vec<MetricKind>,
+    pub bold: Vec<MetricId>,
     /// Why a number of the row is probably a slip.
     #[serde(default)]
     pub doubt: Option<String>,
     /// True for a printed average over the sequences.
     #[serde(default)]
     pub average: bool,
+    /// The printed numbers.
+    #[serde(flatten)]
+    pub values: BTreeMap<MetricId, Printed>,
 }
 
 impl PaperRow {
     /// The printed number of a metric.
-    pub fn value(&self, metric: MetricKind) -> Option<&Printed> {
-        match metric {
-            MetricKind::Psnr => self.psnr.as_ref(),
-            MetricKind::Ssim => self.ssim.as_ref(),
-            MetricKind::Lpips => self.lpips.as_ref(),
-            MetricKind::Splats => self.splats.as_ref(),
-        }
+    pub fn value(&self, metric: MetricId) -> Option<&Printed> {
+        self.values.get(&metric)
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
 use serde::{Serialize, Serializer};
 use serde_json::json;
 use skinsplat_data::key::content_key;
-use skinsplat_metrics::{MetricKind, Protocol, ProtocolId};
+use skinsplat_metrics::{MetricId, Protocol, ProtocolId};
 use skinsplat_posing::Strategy;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -90,10 +90,8 @@ pub struct Job {
     pub resolution: Option<u32>,
     /// Whether the antialiased rasterizer renders.
     pub antialiased: bool,
-    /// Whether the table has a column for SSIM.
-    pub ssim: bool,
-    /// Whether the table has a column for LPIPS.
-    pub lpips: bool,
+    /// What is computed: the metrics that the table shows, and those that cost nothing. Ascending.
+    pub metrics: Vec<MetricId>,
     /// What is rendered.
     pub variants: Vec<JobVariant>,
 }
@@ -232,8 +230,8 @@ impl Builder<'_> {
     ) {
         let test = find_sequence(self.subject(row), &row.sequence).clone();
         let resolution = self.options.profile.resolution;
-        let shows = |metric| experiment.columns.iter().any(|column| column.metric == metric);
-        let (ssim, lpips) = (shows(MetricKind::Ssim), shows(MetricKind::Lpips));
+        let metrics = metrics_of(experiment);
+        let lpips = metrics.contains(&MetricId::LPIPS);
         let weights = self.options.lpips_weights.as_ref().filter(|given| given.net == protocol.lpips.net);
         let choices = Protocol { title: String::new(), source: String::new(), ..Protocol::clone(protocol) };
         for &frame in &row.frames {
@@ -242,7 +240,7 @@ impl Builder<'_> {
                     "code": CodeVersions::CURRENT, "test": test.digest, "frame": frame,
                     "avatar": prepared.avatar, "strategy": prepared.strategy, "protocol": choices,
                     "antialiased": experiment.antialiased, "resolution": resolution,
-                    "ssim": ssim, "lpips": lpips, "lpips_weights": weights.filter(|_| lpips),
+                    "metrics": metrics, "lpips_weights": weights.filter(|_| lpips),
                 });
                 JobVariant {
                     id: prepared.variant.clone(),
@@ -262,8 +260,7 @@ impl Builder<'_> {
                 protocol: protocol.clone(),
                 resolution,
                 antialiased: experiment.antialiased,
-                ssim,
-                lpips,
+                metrics: metrics.clone(),
                 variants: variants.collect(),
             });
         }
@@ -284,6 +281,13 @@ struct Prepared {
     avatar: String,
     /// The strategy in full, so that two specs of one strategy share their keys.
     strategy: Option<Strategy>,
+}
+
+/// What is computed of every frame: PSNR and the number of Gaussians, which cost nothing, and what the columns show.
+fn metrics_of(experiment: &Experiment) -> Vec<MetricId> {
+    let shown = experiment.columns.iter().map(|column| column.metric);
+    let all: BTreeSet<MetricId> = shown.chain([MetricId::PSNR, MetricId::SPLATS]).collect();
+    all.into_iter().collect()
 }
 
 /// The sequence of this id, which rows take from their subject.

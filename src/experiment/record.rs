@@ -34,8 +34,6 @@ pub enum Outcome {
     Scored {
         /// The metrics, in the protocol's variants.
         score: FrameScore,
-        /// Gaussians in the avatar; none for a textured mesh.
-        splats: Option<u64>,
         /// Gaussians that reach the image; none for a textured mesh.
         visible_splats: Option<u64>,
     },

@@ -3,7 +3,7 @@
 use super::{EMBEDDED, Error, FURTHER, Paper, Replicate, Source, Split, catalog, seeds, validate};
 use serde::{Deserialize, Serialize};
 use skinsplat_data::Capture;
-use skinsplat_metrics::MetricKind;
+use skinsplat_metrics::MetricId;
 use skinsplat_posing::PRESETS;
 use std::path::Path;
 
@@ -111,7 +111,7 @@ pub struct StandIn {
 #[serde(deny_unknown_fields)]
 pub struct Column {
     /// The metric.
-    pub metric: MetricKind,
+    pub metric: MetricId,
     /// Title; the metric's usual one if absent.
     #[serde(default)]
     pub title: Option<String>,

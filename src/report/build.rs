@@ -8,7 +8,7 @@ use super::replicates::{Group, groups, spread};
 use super::results::{FrameResult, SequenceResults, VariantResults};
 use super::stats::paired;
 use crate::experiment::{Column, Experiment, Options, PlannedTable, Source};
-use skinsplat_metrics::MetricKind;
+use skinsplat_metrics::MetricId;
 use skinsplat_table::{Cell, Content, RowKind, Table};
 
 /// Failed or missing frames that a footnote names; the others are counted.
@@ -123,20 +123,21 @@ fn over_seeds(contents: &[Content], column: &Column) -> Cell {
     Cell::with_spread(mean_content(contents), spread, digits(column))
 }
 
-fn content(variant: &VariantResults, metric: MetricKind) -> Content {
+fn content(variant: &VariantResults, metric: MetricId) -> Content {
     match variant.value(metric) {
         Some(value) => Content::number(value),
         None if variant.summary.is_none() => Content::Missing,
-        None if metric == MetricKind::Lpips => Content::NotComputed,
+        None if metric.is_of_frames() => Content::NotComputed,
         None => Content::NotApplicable,
     }
 }
 
 fn not_computed(column: &Column) -> String {
-    format!(
-        "n/c: {} was not computed for every frame (it needs the network's weights and images of its minimum size)",
-        column.title()
-    )
+    let reason = match column.metric.metric().needs {
+        "" => String::new(),
+        needs => format!(" ({needs})"),
+    };
+    format!("n/c: {} was not computed for every frame{reason}", column.title())
 }
 
 /// `3 of 12 frames missing: a (error), b (not run), ...`.
@@ -242,7 +243,7 @@ fn differences(
     sequences: &[SequenceResults],
     pairs: &[(usize, usize)],
 ) -> Vec<MetricDifference> {
-    let columns = experiment.columns.iter().filter(|column| column.metric != MetricKind::Splats);
+    let columns = experiment.columns.iter().filter(|column| column.metric.is_of_frames());
     let difference = |column: &Column| {
         let of_frame = |sequence: &SequenceResults, (b, v): (usize, usize), frame: usize| {
             let value = |variant: usize| sequence.variants[variant].frames[frame].value(column.metric);

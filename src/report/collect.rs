@@ -73,8 +73,7 @@ fn sequence(
             let key = &job.variants.iter().find(|v| v.id == variant.id)?.key;
             Some((*job, key.as_str()))
         });
-        let (frames, splats): (Vec<FrameResult>, Vec<Option<u64>>) =
-            planned.map(|(job, key)| frame(job, key, records)).unzip();
+        let frames: Vec<FrameResult> = planned.map(|(job, key)| frame(job, key, records)).collect();
         let scores: Vec<FrameScore> = frames.iter().filter_map(|frame| frame.score.clone()).collect();
         let summary = (!scores.is_empty()).then(|| protocol.aggregate(&scores)).transpose();
         Ok(VariantResults {
@@ -85,7 +84,6 @@ fn sequence(
             strategy: variant.strategy.clone(),
             summary: summary
                 .map_err(|source| Error::Scores { at: format!("{}, {}", row.id, variant.id), source })?,
-            splats: splats.into_iter().flatten().max(),
             frames,
         })
     };
@@ -97,8 +95,8 @@ fn sequence(
     })
 }
 
-/// A planned frame and the Gaussians of its avatar.
-fn frame(job: &Job, key: &str, records: &Records) -> (FrameResult, Option<u64>) {
+/// What a planned frame became.
+fn frame(job: &Job, key: &str, records: &Records) -> FrameResult {
     let mut result = FrameResult {
         frame: job.frame,
         name: job.name.clone(),
@@ -107,15 +105,13 @@ fn frame(job: &Job, key: &str, records: &Records) -> (FrameResult, Option<u64>) 
         visible_splats: None,
         error: None,
     };
-    let mut count = None;
     match records.get(key).map(|record| &record.outcome) {
-        Some(Outcome::Scored { score, splats, visible_splats, .. }) => {
+        Some(Outcome::Scored { score, visible_splats, .. }) => {
             result.score = Some(score.clone());
             result.visible_splats = *visible_splats;
-            count = *splats;
         }
         Some(Outcome::Error(error)) => result.error = Some(error.clone()),
         None => {}
     }
-    (result, count)
+    result
 }

@@ -2,41 +2,33 @@
 
 use super::results::{FrameResult, Results, VariantResults};
 use serde::{Deserialize, Serialize};
-use skinsplat_metrics::MetricKind;
+use skinsplat_metrics::MetricId;
 use std::collections::BTreeMap;
 
-/// How far a number may move without counting.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Tolerances {
-    /// dB.
-    pub psnr: f64,
-    /// SSIM.
-    pub ssim: f64,
-    /// LPIPS.
-    pub lpips: f64,
-    /// Gaussians.
-    pub splats: f64,
-}
+/// How far a number of each metric may move without counting.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tolerances(BTreeMap<MetricId, f64>);
 
 impl Default for Tolerances {
-    /// Half of the last digit that tables print; splat counts must be equal.
+    /// Half of the last digit that tables print; counts must be equal.
     fn default() -> Self {
-        Self { psnr: 0.005, ssim: 0.00005, lpips: 0.00005, splats: 0.0 }
+        Self::each(|metric| metric.metric().tolerance)
     }
 }
 
 impl Tolerances {
-    /// No movement at all: for two runs of one program on one machine.
-    pub const NONE: Self = Self { psnr: 0.0, ssim: 0.0, lpips: 0.0, splats: 0.0 };
+    /// A tolerance for every metric.
+    pub fn each(tolerance: impl Fn(MetricId) -> f64) -> Self {
+        Self(MetricId::all().map(|metric| (metric, tolerance(metric))).collect())
+    }
 
-    fn of(&self, metric: MetricKind) -> f64 {
-        match metric {
-            MetricKind::Psnr => self.psnr,
-            MetricKind::Ssim => self.ssim,
-            MetricKind::Lpips => self.lpips,
-            MetricKind::Splats => self.splats,
-        }
+    /// No movement at all: for two runs of one program on one machine.
+    pub fn none() -> Self {
+        Self::each(|_| 0.0)
+    }
+
+    fn of(&self, metric: MetricId) -> f64 {
+        self.0.get(&metric).copied().unwrap_or_default()
     }
 }
 
@@ -69,7 +61,7 @@ pub struct Move {
     /// Table, sequence and variant, and for a frame its name.
     pub at: String,
     /// The metric.
-    pub metric: MetricKind,
+    pub metric: MetricId,
     /// In the baseline.
     pub baseline: f64,
     /// In the candidate.
@@ -86,7 +78,7 @@ impl Move {
     }
 
     /// The movement of a number, if it moved.
-    fn new(at: String, metric: MetricKind, baseline: f64, candidate: f64, tolerance: f64) -> Option<Self> {
+    fn new(at: String, metric: MetricId, baseline: f64, candidate: f64, tolerance: f64) -> Option<Self> {
         if baseline == candidate {
             return None;
         }
@@ -165,7 +157,7 @@ impl Changes {
         tolerances: &Tolerances,
     ) {
         self.compared += 1;
-        for metric in MetricKind::ALL {
+        for metric in MetricId::all() {
             let tolerance = tolerances.of(metric);
             match (before.value(metric), after.value(metric)) {
                 (Some(a), Some(b)) => {
@@ -183,7 +175,7 @@ impl Changes {
                 self.lost.push(at);
                 continue;
             };
-            for metric in MetricKind::ALL {
+            for metric in MetricId::all() {
                 if let (Some(a), Some(b)) = (frame.value(metric), other.value(metric)) {
                     let moved = Move::new(at.clone(), metric, a, b, tolerances.of(metric));
                     self.frames.extend(moved);

@@ -2,7 +2,7 @@
 
 use super::stats::Paired;
 use serde::{Deserialize, Serialize};
-use skinsplat_metrics::MetricKind;
+use skinsplat_metrics::MetricId;
 use skinsplat_table::{Cell, Column, Digits, Label, Row, Table};
 
 /// Two variants compared frame by frame.
@@ -24,7 +24,7 @@ pub struct Comparison {
 #[serde(deny_unknown_fields)]
 pub struct MetricDifference {
     /// The metric.
-    pub metric: MetricKind,
+    pub metric: MetricId,
     /// Digits after the point.
     pub decimals: usize,
     /// The difference; none if no frame was scored for both or one is infinite. With several seeds, frames are means over

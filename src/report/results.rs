@@ -4,7 +4,7 @@
 use super::comparison::Comparison;
 use crate::experiment::{AvatarRecipe, CodeVersions, Options, Source};
 use serde::{Deserialize, Serialize};
-use skinsplat_metrics::{FrameScore, MetricKind, ProtocolId, Summary};
+use skinsplat_metrics::{FrameScore, MetricId, ProtocolId, Summary};
 use skinsplat_table::{Digits, Table, to_json};
 
 /// Version of the document's format.
@@ -128,8 +128,6 @@ pub struct VariantResults {
     pub strategy: Option<String>,
     /// The metrics over the scored frames, aggregated as the protocol says; none without a scored frame.
     pub summary: Option<Summary>,
-    /// Gaussians in the avatar; none for a textured mesh.
-    pub splats: Option<u64>,
     /// Every planned frame, in order.
     pub frames: Vec<FrameResult>,
 }
@@ -146,14 +144,8 @@ impl VariantResults {
     }
 
     /// The metric over the scored frames.
-    pub fn value(&self, metric: MetricKind) -> Option<f64> {
-        let summary = self.summary.as_ref()?;
-        match metric {
-            MetricKind::Psnr => Some(summary.psnr),
-            MetricKind::Ssim => summary.ssim,
-            MetricKind::Lpips => summary.lpips,
-            MetricKind::Splats => self.splats.map(|count| count as f64),
-        }
+    pub fn value(&self, metric: MetricId) -> Option<f64> {
+        self.summary.as_ref()?.value(metric)
     }
 }
 
@@ -176,14 +168,8 @@ pub struct FrameResult {
 }
 
 impl FrameResult {
-    /// The frame's own value of a metric; none for what only a sequence has.
-    pub fn value(&self, metric: MetricKind) -> Option<f64> {
-        let score = self.score.as_ref()?;
-        match metric {
-            MetricKind::Psnr => Some(score.psnr),
-            MetricKind::Ssim => score.ssim,
-            MetricKind::Lpips => score.lpips,
-            MetricKind::Splats => None,
-        }
+    /// The frame's own value of a metric; none for what only an avatar has.
+    pub fn value(&self, metric: MetricId) -> Option<f64> {
+        self.score.as_ref()?.value(metric).filter(|_| metric.is_of_frames())
     }
 }

@@ -181,10 +181,10 @@ fn run_variant(
     scratch: &mut Scratch,
 ) -> Result<(Outcome, Seconds), Error> {
     let avatar = avatar.as_ref().map_err(|problem| Error::Avatar { problem: problem.clone() })?;
-    let wanted = Wanted { ssim: job.ssim, lpips: job.lpips.then_some(distances) };
+    let wanted = Wanted { lpips: Some(distances), ..Wanted::of(&job.metrics) };
     let Scored { score, drawn, score_seconds } =
         frame.evaluate(avatar, &look(job, variant)?, &job.protocol, wanted, scratch)?;
-    let Drawn { splats, visible_splats, pose_seconds, render_seconds, .. } = drawn;
+    let Drawn { visible_splats, pose_seconds, render_seconds, .. } = drawn;
     let seconds = Seconds { pose: pose_seconds, render: render_seconds, score: score_seconds };
-    Ok((Outcome::Scored { score, splats, visible_splats }, seconds))
+    Ok((Outcome::Scored { score, visible_splats }, seconds))
 }

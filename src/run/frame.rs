@@ -4,7 +4,7 @@ use super::Error;
 use super::drawable::{Drawable, Drawn, Look, PosedView, Scratch};
 use skinsplat_core::scene::PosedBody;
 use skinsplat_data::{Sequence, Truth};
-use skinsplat_metrics::{FrameScore, Protocol, Wanted};
+use skinsplat_metrics::{AvatarStats, FrameScore, Protocol, Wanted};
 use std::time::Instant;
 
 /// A frame, loaded.
@@ -55,6 +55,7 @@ impl<'a> Frame<'a> {
         let drawn = drawable.draw(&self.view, look, scratch)?;
         let start = Instant::now();
         let truth = skinsplat_metrics::Truth::Straight { rgb: &self.truth.rgb, alpha: &self.truth.alpha };
+        let wanted = Wanted { avatar: AvatarStats { gaussians: drawn.splats }, ..wanted };
         let score = protocol.score_with(&drawn.image, truth, wanted)?;
         Ok(Scored { score, drawn, score_seconds: start.elapsed().as_secs_f64() })
     }

@@ -10,6 +10,7 @@ use super::{Error, Event, Library};
 use crate::experiment::{Job, Outcome, Plan, Records};
 use skinsplat_core::scene::{Image, Mask, SceneError};
 use skinsplat_data::frames::save_png;
+use skinsplat_metrics::MetricId;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -66,7 +67,7 @@ pub fn write(
 fn most_telling<'a>(plan: &'a Plan, records: &Records) -> Vec<&'a Job> {
     let spread = |job: &Job| {
         let psnr = |key: &str| match &records.get(key)?.outcome {
-            Outcome::Scored { score, .. } => Some(score.psnr),
+            Outcome::Scored { score, .. } => score.value(MetricId::PSNR),
             Outcome::Error(_) => None,
         };
         let scores: Option<Vec<f64>> = job.variants.iter().map(|variant| psnr(&variant.key)).collect();

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use skinsplat_core::scene::RestBody;
 use skinsplat_data::Sequence;
 use skinsplat_fit::train::Fitted;
-use skinsplat_metrics::{Protocol, Wanted};
+use skinsplat_metrics::{MetricId, Protocol, Wanted};
 use skinsplat_posing::Strategy;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -71,14 +71,16 @@ fn of_sequence(
     let background = protocol.background_colour().unwrap_or([1.0; 3]);
     let look = Look { strategy: Some(*strategy), background, antialiased: false };
     let read = drawable.joints_read(strategy);
+    let wanted = Wanted::of(if ssim { &[MetricId::PSNR, MetricId::SSIM] } else { &[MetricId::PSNR] });
     let score = |scratch: &mut Scratch, index: usize| {
         let frame = Frame::load(sequence, index, read.as_deref())?;
-        Ok(frame.evaluate(drawable, &look, protocol, Wanted { ssim, lpips: None }, scratch)?.score)
+        Ok(frame.evaluate(drawable, &look, protocol, wanted, scratch)?.score)
     };
     let frames = (0..sequence.frames.len()).into_par_iter();
     let scores = frames.map_init(Scratch::default, score).collect::<Result<Vec<_>, Error>>()?;
     let summary = protocol.aggregate(&scores)?;
-    Ok((summary.psnr, summary.ssim))
+    let psnr = summary.value(MetricId::PSNR).unwrap_or(f64::NAN); // every frame has it
+    Ok((psnr, summary.value(MetricId::SSIM)))
 }
 
 /// +inf as none, in text and in binary.

@@ -1,7 +1,7 @@
 //! The results store: an append-only file of JSON lines, keyed by content.
 //!
 //! ```text
-//! {"header":{"schema":1,"plan":"9f2c…"}}
+//! {"header":{"schema":2,"plan":"9f2c…"}}
 //! {"frame":{"key":"51ab…","label":"…","outcome":{"scored":{…}},"seconds":{…}}}
 //! ```
 //!
@@ -18,8 +18,8 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Version of the file format.
-pub const SCHEMA: u32 = 1;
+/// Version of the file format. Stores of other versions are refused: a run into a new folder makes their records anew.
+pub const SCHEMA: u32 = 2;
 
 /// File name of a run that is not sharded.
 pub const FILE_NAME: &str = "frames.jsonl";

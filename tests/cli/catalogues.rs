@@ -79,6 +79,7 @@ fn list_names_everything_that_can_be_chosen() {
         ("datasets", vec!["synthetic", "snapshot_ava", "neuman"]),
         ("strategies", skinsplat_posing::PRESETS.iter().map(|p| p.id).collect()),
         ("protocols", skinsplat_metrics::PROTOCOLS.iter().map(|p| p.id.as_str()).collect()),
+        ("metrics", skinsplat_metrics::METRICS.iter().map(|metric| metric.id).collect()),
         ("metrics", vec!["psnr", "ssim_zero_pad", "psnr_mean_of_channels_mask"]),
     ] {
         let text = desk.ok(args!["list", what]);

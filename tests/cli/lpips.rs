@@ -81,7 +81,7 @@ fn lpips_agrees_with_the_reference_and_a_file_goes_before_what_is_built_in() {
         let (found, expected) = (&built_in[format!("lpips_{variant}")], &expected[variant]);
         assert!((found.as_f64().unwrap() - expected.as_f64().unwrap()).abs() < 1e-6, "{variant}: {found}");
     }
-    assert_eq!(built_in["protocol"]["lpips"], built_in["lpips_alex_raw01"]);
+    assert_eq!(built_in["protocol"]["values"]["lpips"], built_in["lpips_alex_raw01"]);
     let missing = &built_in["not_computed"]["lpips_vgg_pm1"];
     assert_eq!(missing, "lpips: no weights for vgg; expected --lpips-weights FILE with the vgg network");
     desk.put("alex.safetensors", ALEX_BYTES);
@@ -138,8 +138,8 @@ fn every_protocol_at_once_is_each_by_itself() {
         let single: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(row["scores"], single["protocol"], "{}", protocol.id);
         let vgg = protocol.lpips.net == LpipsNet::Vgg;
-        assert_eq!(row["scores"]["lpips"].is_number(), !vgg, "{row}");
-        assert_eq!(row["lpips_not_computed"].is_string(), vgg, "{row}");
+        assert_eq!(row["scores"]["values"]["lpips"].is_number(), !vgg, "{row}");
+        assert_eq!(row["scores"]["not_computed"]["lpips"].is_string(), vgg, "{row}");
     }
     let text = desk.ok(args!["score", "renders", "truths", "--protocol", "all"]);
     assert!(text.lines().any(|line| line.starts_with("3dgs@1  ")), "{text}");
@@ -155,6 +155,6 @@ fn every_protocol_at_once_is_each_by_itself() {
     desk.put("vgg.safetensors", made_up_vgg());
     let given = all(&["--lpips-weights", "vgg.safetensors"]);
     for row in given["protocols"].as_array().unwrap().iter().filter(|row| !row["scores"].is_null()) {
-        assert!(row["scores"]["lpips"].as_f64().unwrap() > 0.0, "{row}");
+        assert!(row["scores"]["values"]["lpips"].as_f64().unwrap() > 0.0, "{row}");
     }
 }

@@ -43,17 +43,23 @@ fn a_worse_result_is_exit_code_1() {
     assert!(same.out.contains("verdict: identical"), "{}", same.out);
 
     let mut results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
-    let summary = &mut results["tables"][0]["sequences"][0]["variants"][1]["summary"]["psnr"];
+    let summary = &mut results["tables"][0]["sequences"][0]["variants"][1]["summary"]["values"]["psnr"];
     let psnr = summary.as_f64().unwrap();
     *summary = Value::from(psnr - 0.25);
     desk.put("worse.json", results.to_string());
     let worse = compare("worse.json", &[]).exits(1, "0.25 dB less");
     assert!(worse.out.contains("verdict: worse") && worse.out.contains("psnr"), "{}", worse.out);
     compare("worse.json", &["--tolerance-psnr", "0.3"]).exits(0, "within the tolerance");
+    for metric in skinsplat_metrics::METRICS {
+        let option = format!("--tolerance-{}", metric.id);
+        compare("run", &[&option, "0.5"]).exits(0, &option);
+        compare("run", &[&option, "much"]).refuses(&[&option, "much"], "no number");
+    }
     let json: Value = serde_json::from_str(&compare("worse.json", &["--format", "json"]).out).unwrap();
     assert_eq!(json["verdict"], "worse");
 
-    results["tables"][0]["sequences"][0]["variants"][1]["summary"]["psnr"] = Value::from(psnr + 0.25);
+    results["tables"][0]["sequences"][0]["variants"][1]["summary"]["values"]["psnr"] =
+        Value::from(psnr + 0.25);
     desk.put("better.json", results.to_string());
     compare("better.json", &[]).exits(0, "0.25 dB more");
 
@@ -91,7 +97,8 @@ fn what_is_no_result_is_named() {
         (changed(|r| r["extra"] = Value::from(1)), vec!["bad.json", "extra"]),
         (
             changed(|r| {
-                r["tables"][0]["sequences"][0]["variants"][0]["summary"]["psnr"] = Value::from("high")
+                r["tables"][0]["sequences"][0]["variants"][0]["summary"]["values"]["psnr"] =
+                    Value::from("high")
             }),
             vec!["bad.json"],
         ),
@@ -122,7 +129,7 @@ fn only_metrics_with_a_column_are_computed() {
     let scores = |table: &str| {
         desk.ok(args!["run", table, "--limit", "1", "--out", "run"]);
         let results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
-        let summary = "/tables/0/sequences/0/variants/0/summary";
+        let summary = "/tables/0/sequences/0/variants/0/summary/values";
         results.pointer(summary).unwrap_or_else(|| panic!("{summary}: {results}")).clone()
     };
     let (both, one) = (scores("tiny.toml"), scores("one.toml"));

@@ -6,7 +6,8 @@ use skinsplat::experiment::{
 };
 use skinsplat::report::{self, Results, TableResults};
 use skinsplat_data::Capture;
-use skinsplat_metrics::{FrameScore, Protocol};
+use skinsplat_metrics::{FrameScore, MetricId, Protocol};
+use std::collections::BTreeMap;
 
 /// A seventh table: not one of the paper's, on a data set that no code knows.
 pub(super) const TABLE_7: &str = include_str!("table7.toml");
@@ -83,15 +84,16 @@ pub(super) fn figures() -> Dataset {
 
 pub(super) fn score(protocol: &str, psnr: f64, ssim: f64, lpips: Option<f64>) -> FrameScore {
     let mse = 10_f64.powf(-psnr / 10.0);
+    let values = [(MetricId::PSNR, psnr), (MetricId::SSIM, ssim), (MetricId::SPLATS, 100.0)];
+    let values = values.into_iter().chain(lpips.map(|lpips| (MetricId::LPIPS, lpips))).collect();
+    let missing = lpips.is_none().then(|| (MetricId::LPIPS, "no weights".to_owned()));
     FrameScore {
         protocol: Protocol::parse(protocol).unwrap().key(),
         pixels: 100,
         channel_mse: [mse; 3],
         mse,
-        psnr,
-        ssim: Some(ssim),
-        lpips,
-        lpips_missing: None,
+        values,
+        not_computed: missing.into_iter().collect::<BTreeMap<_, _>>(),
     }
 }
 
@@ -100,7 +102,7 @@ pub(super) fn record(key: &str, outcome: Outcome) -> FrameRecord {
 }
 
 pub(super) fn scored(key: &str, score: FrameScore) -> FrameRecord {
-    record(key, Outcome::Scored { score, splats: Some(100), visible_splats: Some(90) })
+    record(key, Outcome::Scored { score, visible_splats: Some(90) })
 }
 
 /// A score for everything in the plan: frame k of variant v in row r has PSNR `20 + r + v / 2 + k / 10`.

@@ -7,6 +7,7 @@ mod support;
 mod experiments;
 mod formats;
 mod made_up;
+mod metrics;
 mod plans;
 mod reports;
 mod stores;

@@ -6,7 +6,7 @@ use super::made_up::{
 use skinsplat::experiment::{Experiment, Outcome, Records, Source, plan};
 use skinsplat::report::compare::{Tolerances, Verdict, compare};
 use skinsplat::report::{self, Results, TableResults};
-use skinsplat_metrics::MetricKind;
+use skinsplat_metrics::MetricId;
 use skinsplat_table::{Content, Row, RowKind, csv, markdown};
 
 #[test]
@@ -40,8 +40,7 @@ fn every_cell_of_the_paper_s_tables_is_printed_with_its_digits_and_bold() {
         let markdown = markdown(printed);
         let cells: Vec<_> = printed.rows.iter().flat_map(|row| &row.cells).collect();
         let paper = experiment.paper.as_ref().unwrap();
-        let numbers =
-            MetricKind::ALL.iter().flat_map(|&m| paper.rows.iter().filter_map(move |row| row.value(m)));
+        let numbers = MetricId::all().flat_map(|m| paper.rows.iter().filter_map(move |row| row.value(m)));
         assert_eq!(cells.len(), numbers.count(), "{}", experiment.id);
         for row in &paper.rows {
             for column in &experiment.columns {
@@ -172,7 +171,7 @@ fn a_table_without_data_shows_the_paper_s_alone() {
 #[test]
 fn comparisons_find_what_moved() {
     let base = results(&table_7(), run);
-    assert_eq!(compare(&base, &base, &Tolerances::NONE).verdict, Verdict::Identical);
+    assert_eq!(compare(&base, &base, &Tolerances::none()).verdict, Verdict::Identical);
     let moved = |by: f64| {
         results(&table_7(), |plan| {
             let mut records = run(plan);
@@ -180,13 +179,14 @@ fn comparisons_find_what_moved() {
             let Outcome::Scored { score, .. } = &mut records.get_mut(key).unwrap().outcome else {
                 unreachable!()
             };
-            score.psnr += by;
+            let psnr = score.value(MetricId::PSNR).unwrap();
+            score.values.insert(MetricId::PSNR, psnr + by);
             records
         })
     };
     let within = compare(&base, &moved(-0.01), &Tolerances::default());
     assert_eq!((within.verdict, within.sequences.len(), within.frames.len()), (Verdict::Within, 0, 1));
-    assert_eq!(compare(&base, &moved(-0.01), &Tolerances::NONE).verdict, Verdict::Worse);
+    assert_eq!(compare(&base, &moved(-0.01), &Tolerances::none()).verdict, Verdict::Worse);
     let better = compare(&base, &moved(0.6), &Tolerances::default());
     assert_eq!((better.verdict, better.verdict.is_good()), (Verdict::Better, true));
     let worse = compare(&base, &moved(-0.6), &Tolerances::default());
@@ -216,15 +216,15 @@ fn comparisons_find_what_moved() {
 #[test]
 fn lost_frames_are_worse_and_new_ones_are_not() {
     let (full, holes) = (results(&table_7(), run), results(&table_7(), with_holes));
-    let lost = compare(&full, &holes, &Tolerances { psnr: 1e9, ssim: 1e9, lpips: 1e9, splats: 1e9 });
+    let lost = compare(&full, &holes, &Tolerances::each(|_| 1e9));
     assert_eq!(lost.verdict, Verdict::Worse);
     assert!(lost.lost.iter().any(|at| at.ends_with("anna-test / matrices / image_0002")), "{:?}", lost.lost);
     assert!(lost.lost.iter().any(|at| at.ends_with("bob-test / matrices lpips")), "{:?}", lost.lost);
     let empty = results(&table_7(), |_| Records::new());
-    assert_eq!(compare(&empty, &full, &Tolerances::NONE).lost.len(), 0);
+    assert_eq!(compare(&empty, &full, &Tolerances::none()).lost.len(), 0);
     let mut other = full.clone();
     other.tables[0].experiment = "table8".into();
-    assert_eq!(compare(&empty, &other, &Tolerances::NONE).verdict, Verdict::NothingCompared);
+    assert_eq!(compare(&empty, &other, &Tolerances::none()).verdict, Verdict::NothingCompared);
 }
 
 /// PSNR of `matrices` 30 and 32 dB with the two seeds, of `quaternions` 1 and 3 dB more.

@@ -130,7 +130,7 @@ fn another_plan_keeps_the_records_and_adds_a_header() {
     let headers: Vec<&str> = text.lines().filter(|line| line.contains("header")).collect();
     assert_eq!(
         headers,
-        [r#"{"header":{"schema":1,"plan":"first"}}"#, r#"{"header":{"schema":1,"plan":"second"}}"#]
+        [r#"{"header":{"schema":2,"plan":"first"}}"#, r#"{"header":{"schema":2,"plan":"second"}}"#]
     );
 }
 
@@ -144,7 +144,7 @@ fn other_files_are_refused_and_left_alone() {
             ":1: not a results store; expected a line that begins with {\"header\":{",
         ),
         ("{\"a\": 1}\n".to_owned(), ":1: not a results store"),
-        (store.replace("\"schema\":1", "\"schema\":2"), ":1: schema 2; expected 1"),
+        (store.replace("\"schema\":2", "\"schema\":1"), ":1: schema 1; expected 2"),
         (store.replace("\"psnr\":20.0", "\"psnr\":\"x\""), ":2: invalid type"),
         (format!("{store}\n"), ":3: EOF"),
         (store.replace("\"label\"", "\"labels\""), ":2: unknown field `labels`"),

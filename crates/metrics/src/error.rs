@@ -1,12 +1,11 @@
 //! What can be wrong with the input of a metric.
 
+use std::fmt;
+
 /// Why a metric, or a protocol, refuses its input. Sizes are width x height in pixels.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum MetricsError {
     /// Two images, or an image and its mask, differ in size.
-    #[error(
-        "{field}: {found_width}x{found_height} pixels; expected {width}x{height}, the size of the render"
-    )]
     SizeMismatch {
         /// "truth", "alpha" or "mask".
         field: &'static str,
@@ -20,7 +19,6 @@ pub enum MetricsError {
         height: usize,
     },
     /// A NaN or an infinity.
-    #[error("{field}: {value} in channel {channel} at x {x}, y {y}; expected a finite value")]
     NotFinite {
         /// "render", "truth", "alpha" or "mask".
         field: &'static str,
@@ -34,7 +32,6 @@ pub enum MetricsError {
         value: f32,
     },
     /// The image (after cropping) cannot hold the window or its padding.
-    #[error("{metric}: the scored image has {width}x{height} pixels; expected at least {minimum}x{minimum}")]
     TooSmall {
         /// Which variant refuses.
         metric: &'static str,
@@ -46,7 +43,6 @@ pub enum MetricsError {
         minimum: usize,
     },
     /// Weights of LPIPS that are not what they should be.
-    #[error("{field}: {problem}; expected {expected}")]
     Weights {
         /// The file as a whole, or a tensor.
         field: String,
@@ -56,13 +52,11 @@ pub enum MetricsError {
         expected: String,
     },
     /// A region needs a mask and none was given.
-    #[error("mask: none given; expected one, for region \"{region}\"")]
     NoMask {
         /// The region.
         region: &'static str,
     },
     /// The region holds no pixel.
-    #[error("mask: region \"{region}\" holds no pixel; expected at least one value of {threshold} or more")]
     EmptyRegion {
         /// The region.
         region: &'static str,
@@ -70,23 +64,16 @@ pub enum MetricsError {
         threshold: f32,
     },
     /// No pixel of the mask has a window that fits into the image.
-    #[error(
-        "{metric}: the map covers no pixel of the mask; expected a mask that reaches further from the border"
-    )]
     NoCoveredPixel {
         /// Which variant refuses.
         metric: &'static str,
     },
     /// The value range of the images, which sets the constants of SSIM, is zero.
-    #[error(
-        "{metric}: both images are constant, so their value range is 0 and the index is 0/0; expected a range above 0"
-    )]
     ZeroRange {
         /// Which variant refuses.
         metric: &'static str,
     },
     /// Settings that no metric can have.
-    #[error("{field}: {problem}; expected {expected}")]
     Settings {
         /// The setting.
         field: &'static str,
@@ -96,7 +83,6 @@ pub enum MetricsError {
         expected: &'static str,
     },
     /// A protocol that does not exist or does not parse.
-    #[error("protocol \"{id}\": {problem}; expected {expected}")]
     Protocol {
         /// As asked for.
         id: String,
@@ -106,7 +92,6 @@ pub enum MetricsError {
         expected: String,
     },
     /// Scores that cannot be aggregated.
-    #[error("frame {index}: {problem}; expected {expected}")]
     Frames {
         /// Position in the list.
         index: usize,
@@ -116,34 +101,74 @@ pub enum MetricsError {
         expected: String,
     },
     /// The weights of an LPIPS network are not at hand.
-    #[error("lpips: no weights for {net}; expected --lpips-weights FILE with the {net} network")]
     NoWeights {
         /// Its name.
         net: &'static str,
     },
     /// Regions that LPIPS has no meaning for.
-    #[error("lpips: region \"{region}\" is a set of pixels; expected one that is an image")]
     NoImage {
         /// The region.
         region: &'static str,
     },
 }
 
+impl std::error::Error for MetricsError {}
+
+/// One line: what, its problem, and what was expected.
+impl fmt::Display for MetricsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (what, problem, expected): (&str, String, String) = match self {
+            Self::SizeMismatch { field, found_width, found_height, width, height } => (
+                field,
+                format!("{found_width}x{found_height} pixels"),
+                format!("{width}x{height}, the size of the render"),
+            ),
+            Self::NotFinite { field, x, y, channel, value } => {
+                (field, format!("{value} in channel {channel} at x {x}, y {y}"), "a finite value".into())
+            }
+            Self::TooSmall { metric, width, height, minimum } => (
+                metric,
+                format!("the scored image has {width}x{height} pixels"),
+                format!("at least {minimum}x{minimum}"),
+            ),
+            Self::NoMask { region } => ("mask", "none given".into(), format!("one, for region \"{region}\"")),
+            Self::EmptyRegion { region, threshold } => (
+                "mask",
+                format!("region \"{region}\" holds no pixel"),
+                format!("at least one value of {threshold} or more"),
+            ),
+            Self::NoCoveredPixel { metric } => (
+                metric,
+                "the map covers no pixel of the mask".into(),
+                "a mask that reaches further from the border".into(),
+            ),
+            Self::ZeroRange { metric } => (
+                metric,
+                "both images are constant, so their value range is 0 and the index is 0/0".into(),
+                "a range above 0".into(),
+            ),
+            Self::NoWeights { net } => (
+                "lpips",
+                format!("no weights for {net}"),
+                format!("--lpips-weights FILE with the {net} network"),
+            ),
+            Self::NoImage { region } => {
+                ("lpips", format!("region \"{region}\" is a set of pixels"), "one that is an image".into())
+            }
+            Self::Weights { field, problem, expected } => (field, problem.clone(), expected.clone()),
+            Self::Settings { field, problem, expected } => (field, problem.clone(), (*expected).into()),
+            Self::Protocol { id, problem, expected } => {
+                return write!(f, "protocol \"{id}\": {problem}; expected {expected}");
+            }
+            Self::Frames { index, problem, expected } => {
+                return write!(f, "frame {index}: {problem}; expected {expected}");
+            }
+        };
+        write!(f, "{what}: {problem}; expected {expected}")
+    }
+}
+
 impl MetricsError {
-    /// A [`MetricsError::Weights`].
-    pub(crate) fn weights(
-        field: impl Into<String>,
-        problem: impl Into<String>,
-        expected: impl Into<String>,
-    ) -> Self {
-        Self::Weights { field: field.into(), problem: problem.into(), expected: expected.into() }
-    }
-
-    /// Whether it only says that there can be no LPIPS, of images that are sound.
-    pub(crate) fn leaves_lpips_open(&self) -> bool {
-        matches!(self, Self::NoWeights { .. } | Self::NoImage { .. } | Self::TooSmall { .. })
-    }
-
     /// Checks a size against the render's.
     pub(crate) fn check_size(
         field: &'static str,

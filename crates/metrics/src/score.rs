@@ -2,10 +2,13 @@
 
 use super::planes::{check_mask, exact_level};
 use super::region::{bounding_box, inside};
-use super::ssim::ssim_of_planes;
-use super::{Background, ErrorSums, MetricsError, PerceptualDistance, Planes, Protocol, ProtocolId, Region};
+use super::{
+    AvatarStats, Background, ErrorSums, FrameInput, Measure, Measured, MetricId, MetricsError,
+    PerceptualDistance, Planes, Protocol, ProtocolId, Region, Values,
+};
 use serde::{Deserialize, Serialize};
 use skinsplat_core::scene::{Image, Mask};
+use std::collections::BTreeMap;
 
 /// The ground truth of a frame.
 #[derive(Clone, Copy, Debug)]
@@ -54,25 +57,47 @@ pub struct FrameScore {
     pub channel_mse: [f64; 3],
     /// Mean squared error over all values.
     pub mse: f64,
-    /// dB; +inf for identical images, which JSON holds as `null`.
-    #[serde(with = "infinite_as_null")]
-    pub psnr: f64,
-    /// SSIM; `None` (`null`) means "not computed".
-    pub ssim: Option<f64>,
-    /// LPIPS; `None` (`null`) means "not computed".
-    pub lpips: Option<f64>,
-    /// Why a scorer that was there has not computed it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lpips_missing: Option<String>,
+    /// The metrics that were wanted and could be computed.
+    pub values: Values,
+    /// Why those are missing that were wanted of the frame and could not be computed.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub not_computed: BTreeMap<MetricId, String>,
 }
 
-/// What is computed of a frame besides the squared error.
+impl FrameScore {
+    /// The value of a metric, if it was computed.
+    pub fn value(&self, id: MetricId) -> Option<f64> {
+        self.values.get(id)
+    }
+
+    /// Notes what a metric says, if it says anything.
+    fn note(&mut self, id: MetricId, measured: Option<Measured>) {
+        match measured {
+            None => {}
+            Some(Measured::Value(value)) => self.values.insert(id, value),
+            Some(Measured::NotComputed(reason)) => {
+                self.not_computed.insert(id, reason.to_string());
+            }
+        }
+    }
+}
+
+/// What is computed of a frame besides the squared error, and from what.
 #[derive(Clone, Copy)]
 pub struct Wanted<'a> {
-    /// SSIM.
-    pub ssim: bool,
-    /// LPIPS, by this scorer.
+    /// The metrics.
+    pub metrics: &'a [MetricId],
+    /// What computes LPIPS; without it, LPIPS is not computed.
     pub lpips: Option<&'a dyn PerceptualDistance>,
+    /// The avatar that was drawn, for metrics of it.
+    pub avatar: AvatarStats,
+}
+
+impl<'a> Wanted<'a> {
+    /// Metrics of two images, without LPIPS.
+    pub fn of(metrics: &'a [MetricId]) -> Self {
+        Self { metrics, lpips: None, avatar: AvatarStats::default() }
+    }
 }
 
 /// The two images as the metrics see them, after steps 1 to 3 of [`Protocol`].
@@ -87,51 +112,48 @@ pub struct Prepared {
 }
 
 impl Protocol {
-    /// Scores a render, which was drawn over [`Protocol::background_colour`], without LPIPS.
+    /// Scores a render, which was drawn over [`Protocol::background_colour`], by every metric of two images that needs
+    /// nothing else: all but LPIPS.
     ///
     /// # Errors
     /// Images or masks of different sizes, values that are not finite, a missing or empty mask where the region needs
     /// one, a region too small for the SSIM window.
     pub fn score(&self, render: &Image, truth: Truth<'_>) -> Result<FrameScore, MetricsError> {
-        self.score_with(render, truth, Wanted { ssim: true, lpips: None })
+        let metrics: Vec<MetricId> =
+            MetricId::of_frames().filter(|id| id.metric().needs.is_empty()).collect();
+        self.score_with(render, truth, Wanted::of(&metrics))
     }
 
-    /// What is wanted. LPIPS stays `None`, and the score says why, if there are no weights for its network, if the image
-    /// is too small for it, and in [`Region::Mask`], since LPIPS has no masked form.
+    /// Scores a render by what is wanted. A metric that cannot be computed of images that are sound is named in
+    /// [`FrameScore::not_computed`] with the reason: LPIPS if there are no weights for its network, if the image is too
+    /// small for it, and in [`Region::Mask`], since LPIPS has no masked form.
     ///
     /// # Errors
-    /// As [`Protocol::score`], and other errors of the scorer.
+    /// As [`Protocol::score`], and other errors of the metrics.
     pub fn score_with(
         &self,
         render: &Image,
         truth: Truth<'_>,
         wanted: Wanted<'_>,
     ) -> Result<FrameScore, MetricsError> {
-        let Prepared { render, truth, weights } = self.prepare(render, truth)?;
-        let sums = ErrorSums::new(&render, &truth, weights.as_deref())?;
-        let ssim = wanted.ssim.then(|| {
-            ssim_of_planes(&render, &truth, &self.ssim.settings(), self.ssim.id(), weights.as_deref())
-        });
-        let distance = wanted.lpips.map(|scorer| match weights {
-            None => scorer.distance(&render, &truth, self.lpips),
-            Some(_) => Err(MetricsError::NoImage { region: self.region.id() }),
-        });
-        let (lpips, lpips_missing) = match distance {
-            None => (None, None),
-            Some(Ok(distance)) => (Some(distance), None),
-            Some(Err(error)) if error.leaves_lpips_open() => (None, Some(error.to_string())),
-            Some(Err(error)) => return Err(error),
-        };
-        Ok(FrameScore {
+        let images = self.prepare(render, truth)?;
+        let errors = ErrorSums::new(&images.render, &images.truth, images.weights.as_deref())?;
+        let mut score = FrameScore {
             protocol: self.key(),
-            pixels: sums.pixels as u64,
-            channel_mse: sums.channel_mse(),
-            mse: sums.mse(),
-            psnr: self.psnr.psnr(sums.channel_mse()),
-            ssim: ssim.transpose()?,
-            lpips,
-            lpips_missing,
-        })
+            pixels: errors.pixels as u64,
+            channel_mse: errors.channel_mse(),
+            mse: errors.mse(),
+            values: Values::default(),
+            not_computed: BTreeMap::new(),
+        };
+        let frame = FrameInput { protocol: self, images: &images, errors: &errors, lpips: wanted.lpips };
+        for &id in wanted.metrics {
+            match id.metric().measure {
+                Measure::Avatar(of) => score.note(id, of(&wanted.avatar).map(Measured::Value)),
+                Measure::Frame { score: of, .. } => score.note(id, Some(of(&frame)?)),
+            }
+        }
+        Ok(score)
     }
 
     /// Steps 1 to 3: composite, clamp, quantise, cut out the region.
@@ -250,20 +272,6 @@ fn composite(values: &mut [f64], alpha: &[f32], background: f64) {
     }
 }
 
-/// +inf as `null`.
-pub(crate) mod infinite_as_null {
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-    pub(crate) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-        if value.is_finite() { serializer.serialize_f64(*value) } else { serializer.serialize_none() }
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-        Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -292,10 +300,11 @@ mod tests {
         let render = truth.composited(&alpha, [1.0; 3]).unwrap();
         let straight = Truth::Straight { rgb: &truth, alpha: &alpha };
         let score = protocol("").score(&render, straight).unwrap();
-        assert!(score.mse < 1e-15 && (score.ssim.unwrap() - 1.0).abs() < 1e-9, "{score:?}");
+        assert!(score.mse < 1e-15 && (score.value(MetricId::SSIM).unwrap() - 1.0).abs() < 1e-9, "{score:?}");
         let captured = protocol("+background=captured").score(&render, straight).unwrap();
         assert!(captured.mse > 0.1);
-        assert_eq!(protocol("+background=captured").score(&truth, straight).unwrap().psnr, f64::INFINITY);
+        let same = protocol("+background=captured").score(&truth, straight).unwrap();
+        assert_eq!(same.value(MetricId::PSNR), Some(f64::INFINITY));
     }
 
     #[test]
@@ -383,11 +392,12 @@ mod tests {
         let image = gradient([0.3; 3]);
         let score = protocol("").score(&image, Truth::Composited { rgb: &image, mask: None }).unwrap();
         let text = serde_json::to_string(&score).unwrap();
-        assert!(text.contains("\"psnr\":null") && text.contains("\"lpips\":null"), "{text}");
+        assert!(text.contains("\"psnr\":null") && !text.contains("lpips"), "{text}");
         let read: FrameScore = serde_json::from_str(&text).unwrap();
-        assert_eq!((read.psnr, &read), (f64::INFINITY, &score));
-        let without = text.replace("\"psnr\":null,", "");
-        assert!(serde_json::from_str::<FrameScore>(&without).is_err(), "a missing PSNR is not +inf");
+        assert_eq!((read.value(MetricId::PSNR), &read), (Some(f64::INFINITY), &score));
+        let without: FrameScore = serde_json::from_str(&text.replace("\"psnr\":null,", "")).unwrap();
+        assert_eq!(without.value(MetricId::PSNR), None, "a missing PSNR is not +inf");
+        assert!(serde_json::from_str::<FrameScore>(&text.replace("psnr", "beauty")).is_err());
     }
 
     struct MeanDifference;
@@ -408,15 +418,34 @@ mod tests {
     fn a_scorer_fills_lpips_with_the_prepared_images() {
         let (render, truth, mask) = (gradient([0.4; 3]), gradient([0.3; 3]), left_half());
         let truth = Truth::Composited { rgb: &truth, mask: Some(&mask) };
-        let wanted = Wanted { ssim: false, lpips: Some(&MeanDifference) };
+        let wanted = Wanted { lpips: Some(&MeanDifference), ..Wanted::of(&[MetricId::LPIPS]) };
         let lpips = |changes: &str| {
             let score = protocol(changes).score_with(&render, truth, wanted).unwrap();
-            assert_eq!(score.ssim, None);
-            score.lpips
+            assert_eq!(score.value(MetricId::SSIM), None);
+            score
         };
-        assert!((lpips("").unwrap() - 0.1).abs() < 1e-7);
-        assert!((lpips("+region=image-times-mask").unwrap() - 0.05).abs() < 1e-7);
-        assert_eq!(lpips("+region=mask"), None);
-        assert_eq!(protocol("").score(&render, truth).unwrap().lpips, None);
+        assert!((lpips("").value(MetricId::LPIPS).unwrap() - 0.1).abs() < 1e-7);
+        let scaled = lpips("+region=image-times-mask");
+        assert!((scaled.value(MetricId::LPIPS).unwrap() - 0.05).abs() < 1e-7);
+        let masked = lpips("+region=mask");
+        assert_eq!(masked.value(MetricId::LPIPS), None);
+        let reason = "lpips: region \"mask\" is a set of pixels; expected one that is an image";
+        assert_eq!(masked.not_computed[&MetricId::LPIPS], reason);
+        let plain = protocol("").score(&render, truth).unwrap();
+        assert!(plain.value(MetricId::LPIPS).is_none() && plain.not_computed.is_empty());
+    }
+
+    #[test]
+    fn without_a_scorer_lpips_is_open_and_a_mesh_has_no_splats() {
+        let image = gradient([0.3; 3]);
+        let truth = Truth::Composited { rgb: &image, mask: None };
+        let metrics: Vec<MetricId> = MetricId::all().collect();
+        let mesh = Wanted::of(&metrics);
+        let score = protocol("").score_with(&image, truth, mesh).unwrap();
+        assert!(score.not_computed.keys().eq(&[MetricId::LPIPS]), "{score:?}");
+        assert_eq!(score.value(MetricId::SPLATS), None);
+        let avatar = AvatarStats { gaussians: Some(7) };
+        let score = protocol("").score_with(&image, truth, Wanted { avatar, ..mesh }).unwrap();
+        assert_eq!(score.value(MetricId::SPLATS), Some(7.0));
     }
 }

@@ -6,8 +6,11 @@ use anyhow::{Context as _, Result};
 use serde_json::json;
 use skinsplat_metrics::lpips::OneFrame;
 use skinsplat_metrics::lpips::weights::Networks;
-use skinsplat_metrics::{FrameScore, MetricsError, PROTOCOLS, Protocol, Region, Summary, Truth, Wanted};
+use skinsplat_metrics::{
+    FrameScore, MetricId, MetricsError, PROTOCOLS, Protocol, Region, Summary, Truth, Wanted,
+};
 use skinsplat_table::{self as table, Column, Content, Digits, Direction, Label, Table};
+use std::slice::from_mut;
 
 /// What stands for all protocols.
 pub(super) const ID: &str = "all";
@@ -16,8 +19,6 @@ pub(super) const ID: &str = "all";
 struct Row {
     protocol: &'static Protocol,
     outcome: Result<Summary, String>,
-    /// Why there is no LPIPS.
-    lpips_missing: Option<String>,
     /// Frames whose render lies over another background than the protocol's.
     over_another_background: usize,
 }
@@ -38,13 +39,11 @@ pub(super) fn run(arguments: &Score, pairs: &[Pair], context: Context) -> Result
         let cells: Vec<Cell> = frames.iter_mut().filter_map(Vec::pop).collect();
         let over_another_background = cells.iter().filter(|cell| cell.over_another_background).count();
         let scores: Result<Vec<FrameScore>, String> = cells.into_iter().map(|cell| cell.score).collect();
-        let missing = |scores: &Vec<FrameScore>| scores.iter().find_map(|score| score.lpips_missing.clone());
-        let lpips_missing = scores.as_ref().ok().and_then(missing);
         let outcome = match scores {
             Ok(scores) => Ok(protocol.aggregate(&scores)?),
             Err(reason) => Err(reason),
         };
-        rows.push(Row { protocol, outcome, lpips_missing, over_another_background });
+        rows.push(Row { protocol, outcome, over_another_background });
     }
     rows.reverse();
     match arguments.format.as_str() {
@@ -57,12 +56,13 @@ pub(super) fn run(arguments: &Score, pairs: &[Pair], context: Context) -> Result
 fn frame(arguments: &Score, pair: &Pair, networks: &Networks) -> Result<Vec<Cell>> {
     let loaded = pair.load()?;
     let distances = OneFrame::new(networks);
+    let metrics: Vec<MetricId> = MetricId::of_frames().collect();
+    let wanted = Wanted { lpips: Some(&distances), ..Wanted::of(&metrics) };
     let cell = |protocol: &Protocol| {
         let background = arguments.background(Some(protocol));
         let (render, truth) = loaded.over(background)?;
         let truth = Truth::Composited { rgb: &truth, mask: loaded.mask() };
-        let score = match protocol.score_with(&render, truth, Wanted { ssim: true, lpips: Some(&distances) })
-        {
+        let score = match protocol.score_with(&render, truth, wanted) {
             Err(error) if is_of_the_input(&error) => return Err(error).with_context(|| pair.files()),
             score => score.map_err(|error| error.to_string()),
         };
@@ -82,7 +82,6 @@ fn json(rows: &[Row], frames: usize) -> serde_json::Value {
             "protocol": row.protocol,
             "scores": row.outcome.as_ref().ok(),
             "not_computed": row.outcome.as_ref().err(),
-            "lpips_not_computed": row.lpips_missing,
             "frames_over_another_background": row.over_another_background,
         })
     };
@@ -91,8 +90,10 @@ fn json(rows: &[Row], frames: usize) -> serde_json::Value {
 
 /// A row per protocol, with its choices.
 fn table(rows: &[Row], frames: usize) -> Table {
-    let metric =
-        |key: &str, title: &str, (digits, better)| Column::new(key, title).digits(digits).better(better);
+    let metric = |id: MetricId| {
+        let better = Direction::higher_if(id.higher_is_better());
+        Column::new(id.id(), id.title()).digits(digits(id)).better(better)
+    };
     let choices = [
         ("background", "background"),
         ("region", "region"),
@@ -102,11 +103,7 @@ fn table(rows: &[Row], frames: usize) -> Table {
     let mut table = Table {
         sentences: vec![format!("{frames} frames"), spread(rows)],
         labels: vec![Label::new("protocol", "protocol")],
-        columns: vec![
-            metric("psnr", "PSNR", (PSNR, Direction::Higher)),
-            metric("ssim", "SSIM", (OTHERS, Direction::Higher)),
-            metric("lpips", "LPIPS", (OTHERS, Direction::Lower)),
-        ],
+        columns: MetricId::of_frames().map(metric).collect(),
         ..Table::new("protocols", "The same frames under every protocol")
     };
     table.columns.extend(choices.map(|(key, title)| Column::text(key, title)));
@@ -118,31 +115,31 @@ fn table(rows: &[Row], frames: usize) -> Table {
     table
 }
 
-/// As printed.
-const PSNR: Digits = Digits::Decimals(3);
-const OTHERS: Digits = Digits::Decimals(5);
+/// One digit more than in the tables of a run.
+fn digits(metric: MetricId) -> Digits {
+    Digits::Decimals(metric.decimals() + 1)
+}
 
 fn cells(row: &Row, frames: usize, notes: &mut Vec<String>) -> Vec<table::Cell> {
     let protocol = row.protocol;
-    let known = |value: Option<f64>, digits| {
-        let cell = table::Cell::new(Content::NotComputed, digits);
-        value.map_or(cell, |value| table::Cell::number(value, digits))
-    };
     let summary = row.outcome.as_ref().ok();
-    let mut metrics = [
-        known(summary.map(|s| s.psnr), PSNR),
-        known(summary.and_then(|s| s.ssim), OTHERS),
-        known(summary.and_then(|s| s.lpips), OTHERS),
-    ];
+    let metric = |id: MetricId| match summary.and_then(|summary| summary.value(id)) {
+        Some(value) => table::Cell::number(value, digits(id)),
+        None => table::Cell::new(Content::NotComputed, digits(id)),
+    };
+    let mut metrics: Vec<table::Cell> = MetricId::of_frames().map(metric).collect();
     let mut note = |note: String, cells: &mut [table::Cell]| {
         cells.iter_mut().for_each(|cell| cell.notes.push(notes.len()));
         notes.push(note);
     };
     let reason = |reason: &str| format!("{}: not computed: {reason}", protocol.id);
-    match (&row.outcome, &row.lpips_missing) {
-        (Err(why), _) => note(reason(why), &mut metrics),
-        (Ok(_), Some(why)) => note(reason(why), &mut metrics[2..]),
-        (Ok(_), None) => {}
+    match &row.outcome {
+        Err(why) => note(reason(why), &mut metrics),
+        Ok(summary) => {
+            for (cell, id) in metrics.iter_mut().zip(MetricId::of_frames()) {
+                summary.not_computed.get(&id).into_iter().for_each(|why| note(reason(why), from_mut(cell)));
+            }
+        }
     }
     if row.over_another_background > 0 {
         note(
@@ -165,16 +162,12 @@ fn spread(rows: &[Row]) -> String {
     let comparable = |row: &&Row| row.protocol.region == Region::Full && row.over_another_background == 0;
     let summaries: Vec<&Summary> =
         rows.iter().filter(comparable).filter_map(|row| row.outcome.as_ref().ok()).collect();
-    let range = |value: &dyn Fn(&Summary) -> Option<f64>, digits: usize| {
-        let values = summaries.iter().filter_map(|summary| value(summary));
+    let range = |id: MetricId| {
+        let values = summaries.iter().filter_map(|summary| summary.value(id));
         let (low, high) =
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-        format!("{low:.digits$} to {high:.digits$}")
+        format!("{} {} to {}", id.title(), digits(id).show(low), digits(id).show(high))
     };
-    format!(
-        "The protocol alone, whole images: PSNR {}, SSIM {}, LPIPS {}",
-        range(&|summary| Some(summary.psnr), 3),
-        range(&|summary| summary.ssim, 5),
-        range(&|summary| summary.lpips, 5)
-    )
+    let ranges: Vec<String> = MetricId::of_frames().map(range).collect();
+    format!("The protocol alone, whole images: {}", ranges.join(", "))
 }

@@ -16,7 +16,7 @@ use skinsplat_core::scene::Image;
 use skinsplat_metrics::lpips::OneFrame;
 use skinsplat_metrics::lpips::weights::Networks;
 use skinsplat_metrics::{
-    FrameScore, LpipsVariant, PerceptualDistance, Planes, Protocol, Truth, Wanted, all_variants,
+    FrameScore, LpipsVariant, MetricId, PerceptualDistance, Planes, Protocol, Truth, Wanted, all_variants,
 };
 use skinsplat_table::{Table, text};
 use std::collections::BTreeMap;
@@ -129,7 +129,8 @@ impl Score {
             };
         }
         let truth = Truth::Composited { rgb: &truth, mask };
-        let wanted = Wanted { ssim: true, lpips: Some(&distances) };
+        let metrics: Vec<MetricId> = MetricId::of_frames().collect();
+        let wanted = Wanted { lpips: Some(&distances), ..Wanted::of(&metrics) };
         let protocol = protocol.map(|p| p.score_with(&render, truth, wanted)).transpose();
         let protocol = protocol.with_context(context)?;
         let over_another_background = loaded.lies_over_another(background);

@@ -2,8 +2,9 @@
 
 use super::Scored;
 use serde_json::{Map, Value};
-use skinsplat_metrics::{FrameScore, Summary};
+use skinsplat_metrics::{FrameScore, MetricId, ProtocolId, Summary, Values};
 use skinsplat_table::{Cell, Column, Content, Digits, Label, Row, RowKind, Table};
+use std::collections::BTreeMap;
 
 /// As printed.
 const DIGITS: Digits = Digits::Decimals(6);
@@ -26,9 +27,8 @@ pub(super) fn table(
         let name = format!("mean of {} frames", scored.len());
         let mut mean = Frame { name: &name, kind: RowKind::Mean, table: &mut table };
         mean.values(means);
-        let missing = scored.iter().find_map(|frame| frame.protocol.as_ref()?.lpips_missing.as_deref());
-        if let Some(Summary { protocol, psnr, ssim, lpips, .. }) = summary {
-            mean.protocol(protocol, *psnr, *ssim, *lpips, missing);
+        if let Some(Summary { protocol, values, not_computed, .. }) = summary {
+            mean.protocol(protocol, values, not_computed);
         }
     }
     table
@@ -47,8 +47,8 @@ impl Frame<'_> {
         for (id, reason) in &frame.not_computed {
             self.none(id, &format!("{id} not computed: {}", reason.as_str().unwrap_or_default()));
         }
-        if let Some(FrameScore { protocol, psnr, ssim, lpips, lpips_missing, .. }) = &frame.protocol {
-            self.protocol(protocol, *psnr, *ssim, *lpips, lpips_missing.as_deref());
+        if let Some(FrameScore { protocol, values, not_computed, .. }) = &frame.protocol {
+            self.protocol(protocol, values, not_computed);
         }
     }
 
@@ -59,22 +59,16 @@ impl Frame<'_> {
         }
     }
 
-    fn protocol(
-        &mut self,
-        protocol: &impl std::fmt::Display,
-        psnr: f64,
-        ssim: Option<f64>,
-        lpips: Option<f64>,
-        missing: Option<&str>,
-    ) {
-        let missing = missing.unwrap_or("no reason given");
-        for (metric, value, why) in
-            [("psnr", Some(psnr), ""), ("ssim", ssim, "not asked for"), ("lpips", lpips, missing)]
-        {
-            let id = format!("protocol {protocol}: {metric}");
-            match value {
+    /// Every metric of frames under a protocol.
+    fn protocol(&mut self, protocol: &ProtocolId, values: &Values, missing: &BTreeMap<MetricId, String>) {
+        for metric in MetricId::of_frames() {
+            let id = format!("protocol {protocol}: {}", metric.id());
+            match values.get(metric) {
                 Some(value) => self.push(&id, Cell::number(value, DIGITS)),
-                None => self.none(&id, &format!("{id} not computed ({why})")),
+                None => {
+                    let why = missing.get(&metric).map_or("no reason given", String::as_str);
+                    self.none(&id, &format!("{id} not computed ({why})"));
+                }
             }
         }
     }

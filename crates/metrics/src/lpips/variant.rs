@@ -1,6 +1,4 @@
-//! The LPIPS variants by name, and the interface through which a scorer fills [`FrameScore::lpips`].
-//!
-//! [`FrameScore::lpips`]: crate::FrameScore::lpips
+//! The LPIPS variants by name, and the interface through which a scorer is handed to [`Wanted`](crate::Wanted).
 
 use crate::{MetricsError, Planes};
 use serde::{Deserialize, Serialize};

@@ -31,7 +31,7 @@ impl Network {
     /// type, or holds a value that is not finite.
     pub fn from_safetensors(bytes: &[u8]) -> Result<Self, MetricsError> {
         let file = SafeTensors::deserialize(bytes)
-            .map_err(|cause| MetricsError::weights("LPIPS weights", cause.to_string(), EXPECTED))?;
+            .map_err(|cause| wrong("LPIPS weights", cause.to_string(), EXPECTED))?;
         let net = recognised(&file)?;
         let tensors: Vec<Vec<f32>> =
             net.tensors().iter().map(|(name, shape)| tensor(&file, name, shape)).collect::<Result<_, _>>()?;
@@ -39,8 +39,12 @@ impl Network {
     }
 }
 
+fn wrong(field: impl Into<String>, problem: impl Into<String>, expected: impl Into<String>) -> MetricsError {
+    MetricsError::Weights { field: field.into(), problem: problem.into(), expected: expected.into() }
+}
+
 fn view<'a>(file: &SafeTensors<'a>, name: &str) -> Result<safetensors::tensor::TensorView<'a>, MetricsError> {
-    let missing = |_| MetricsError::weights(format!("tensor {name}"), "missing", EXPECTED);
+    let missing = |_| wrong(format!("tensor {name}"), "missing", EXPECTED);
     file.tensor(name).map_err(missing)
 }
 
@@ -50,15 +54,13 @@ fn recognised(file: &SafeTensors<'_>) -> Result<LpipsNet, MetricsError> {
     let found = LpipsNet::ALL.into_iter().find(|&net| first(net) == view.shape());
     found.ok_or_else(|| {
         let expected = LpipsNet::ALL.map(|net| format!("{:?} ({})", first(net), net.id())).join(" or ");
-        MetricsError::weights(format!("tensor {FIRST}"), format!("shape {:?}", view.shape()), expected)
+        wrong(format!("tensor {FIRST}"), format!("shape {:?}", view.shape()), expected)
     })
 }
 
 fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>, MetricsError> {
     let view = view(file, name)?;
-    let invalid = |problem: String, expected: String| {
-        MetricsError::weights(format!("tensor {name}"), problem, expected)
-    };
+    let invalid = |problem: String, expected: String| wrong(format!("tensor {name}"), problem, expected);
     if view.shape() != shape {
         return Err(invalid(format!("shape {:?}", view.shape()), format!("{shape:?}")));
     }

@@ -2,7 +2,7 @@
 //!
 //! Only four moments are needed, because the index reads the variances as their sum: a, b, a² + b², ab. Each row is
 //! filtered vertically, then horizontally, one tap at a time over whole rows, which the compiler turns into vector
-//! instructions of the machine it runs on; multiplications and additions stay apart, so that all machines agree to the
+//! instructions (with the feature `simd` those of the machine it runs on); multiplications and additions stay apart, so that all machines agree to the
 //! last bit.
 
 use super::Border;
@@ -40,7 +40,7 @@ pub(super) struct Scratch {
     index: Vec<f64>,
 }
 
-/// The work of [`Tile::sum`], compiled once per instruction set. (A closure would not be: it is not inlined.)
+/// The work of [`Tile::sum`]. (A closure would not do: it is not inlined into what is compiled per instruction set.)
 struct Sum<'a, 'b> {
     tile: &'a Tile<'b>,
     window: &'a Window,
@@ -49,13 +49,33 @@ struct Sum<'a, 'b> {
     scratch: &'a mut Scratch,
 }
 
+impl Sum<'_, '_> {
+    #[inline(always)]
+    fn run(self) -> f64 {
+        self.tile.sum_rows(self.window, self.constants, self.weights, self.scratch)
+    }
+}
+
+#[cfg(feature = "simd")]
 impl pulp::WithSimd for Sum<'_, '_> {
     type Output = f64;
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> f64 {
-        self.tile.sum_rows(self.window, self.constants, self.weights, self.scratch)
+        self.run()
     }
+}
+
+/// Runs work on the widest vectors of the machine that it runs on.
+#[cfg(feature = "simd")]
+fn dispatch(sum: Sum<'_, '_>) -> f64 {
+    skinsplat_simd::arch().dispatch(sum)
+}
+
+/// Runs work on the vectors that the program is compiled for; the values are the same bit for bit.
+#[cfg(not(feature = "simd"))]
+fn dispatch(sum: Sum<'_, '_>) -> f64 {
+    sum.run()
 }
 
 impl Tile<'_> {
@@ -68,7 +88,7 @@ impl Tile<'_> {
         weights: Option<&[f64]>,
         scratch: &mut Scratch,
     ) -> f64 {
-        skinsplat_simd::arch().dispatch(Sum { tile: self, window, constants, weights, scratch })
+        dispatch(Sum { tile: self, window, constants, weights, scratch })
     }
 
     #[inline(always)]

@@ -8,11 +8,14 @@ use skinsplat_core::scene::Image;
 use skinsplat_data::Truth;
 use skinsplat_metrics::lpips::weights;
 use skinsplat_metrics::lpips::{Network, NetworkSource, OneFrame};
-use skinsplat_metrics::{FrameScore, LpipsNet, MetricsError, Protocol, Wanted};
+use skinsplat_metrics::{FrameScore, LpipsNet, MetricId, MetricsError, Protocol, Wanted};
 use skinsplat_posing::pose;
 use skinsplat_render::View;
 use skinsplat_render::splat::render;
 use std::hint::black_box;
+
+const PSNR_SSIM: [MetricId; 2] = [MetricId::PSNR, MetricId::SSIM];
+const WITH_LPIPS: [MetricId; 3] = [MetricId::PSNR, MetricId::SSIM, MetricId::LPIPS];
 
 /// A frame of the scene, drawn, and its truth.
 struct Scored {
@@ -49,7 +52,7 @@ impl NetworkSource for Fresh {
 /// No column for SSIM.
 pub(super) fn ssim(bench: &Bench<'_>) -> Result<Saving, Error> {
     let frame = Scored::new(bench)?;
-    let [all, needed] = [true, false].map(|ssim| Wanted { ssim, lpips: None });
+    let [all, needed] = [&PSNR_SSIM[..], &PSNR_SSIM[..1]].map(Wanted::of);
     let same = frame.score(all)?.channel_mse == frame.score(needed)?.channel_mse;
     let run = |wanted| frame.score(wanted).map(|score| drop(black_box(score)));
     let [without, with] = in_turns(bench.options.runs, || run(all), || run(needed))?;
@@ -62,11 +65,12 @@ pub(super) fn lpips(bench: &Bench<'_>) -> Result<Saving, Error> {
     let frame = Scored::new(bench)?;
     let all = || {
         let network = Fresh(weights::read_embedded());
-        frame.score(Wanted { ssim: true, lpips: Some(&OneFrame::new(&network)) })
+        frame.score(Wanted { lpips: Some(&OneFrame::new(&network)), ..Wanted::of(&WITH_LPIPS) })
     };
-    let needed = || frame.score(Wanted { ssim: true, lpips: None });
+    let needed = || frame.score(Wanted::of(&PSNR_SSIM));
     let (full, part) = (all()?, needed()?);
-    let same = full.channel_mse == part.channel_mse && full.ssim == part.ssim;
+    let same =
+        full.channel_mse == part.channel_mse && full.value(MetricId::SSIM) == part.value(MetricId::SSIM);
     let [without, with] = in_turns(
         bench.options.runs,
         || all().map(|score| drop(black_box(score))),

@@ -1,0 +1,19 @@
+//! The metrics by name.
+//!
+//! A new metric is a file in this folder, with its function and a [`Metric`], and its line in [`METRICS`]. Columns of tables,
+//! tolerances of comparisons, aggregates of sequences, printed numbers of papers and lists follow from there by name.
+
+mod id;
+mod lpips;
+mod measure;
+mod psnr;
+mod splats;
+mod ssim;
+mod values;
+
+pub use id::MetricId;
+pub use measure::{AvatarStats, FrameInput, Measure, Measured, Metric, OverFrames};
+pub use values::Values;
+
+/// Every metric, in the order in which documents and lists name them.
+pub const METRICS: &[Metric] = &[psnr::METRIC, ssim::METRIC, lpips::METRIC, splats::METRIC];
