@@ -50,9 +50,6 @@ fn group_headings(table: &Table) -> String {
             _ => groups.push((group, 1)),
         }
     }
-    if groups.is_empty() {
-        return String::new();
-    }
     let blank = table.labels.iter().map(|_| String::new());
     let spans = groups.iter().map(|(group, n)| format!("\\multicolumn{{{n}}}{{c}}{{{}}}", escape(group)));
     let mut text = line(&blank.chain(spans).collect::<Vec<_>>());
