@@ -6,7 +6,7 @@ mod files;
 mod support;
 
 use files::Values;
-use skinsplat::datasets::{Layout, Registry};
+use skinsplat::datasets::Registry;
 use skinsplat_core::scene::{Image, Mask, SceneError};
 use skinsplat_data::folder::Options;
 use skinsplat_data::{Capture, FrameSource, Subject, folder, frames, npy};
@@ -199,7 +199,10 @@ fn the_embedded_registry_names_what_is_there() {
         assert_eq!(subject.capture, dataset.capture, "{id}");
     }
     let people = registry.get("peoplesnapshot").unwrap();
-    assert_eq!((people.layout, people.subjects.len(), people.splits.len()), (Layout::PeopleSnapshot, 4, 4));
+    assert_eq!(
+        (people.layout, people.subjects.len(), people.splits.len()),
+        ("peoplesnapshot".to_owned(), 4, 4)
+    );
     let error = registry.get("nothing").unwrap_err().to_string();
     assert!(
         error.contains("datasets.toml: dataset: no id \"nothing\"; expected one of: synthetic,"),

@@ -103,7 +103,9 @@ impl Data {
     pub(super) fn library(&self, experiments: &[Experiment]) -> Result<Library> {
         let own = |id: &str| experiments.iter().any(|experiment| experiment.dataset == id);
         let stands_in = experiments.iter().any(|experiment| experiment.stand_in.is_some());
-        let wanted = |d: &&Dataset| d.is_available() && (own(&d.id) || (stands_in && d.stand_in));
+        // One that is there and that nothing reads is an error where a table asks for it, and no stand-in.
+        let named = |d: &Dataset| own(&d.id) && (d.is_available() || d.is_present());
+        let wanted = |d: &&Dataset| named(d) || (stands_in && d.stand_in && d.is_available());
         let registry = self.registry()?;
         let loaded = registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset, experiments));
         Ok(Library::new(loaded.collect::<Result<_>>()?))

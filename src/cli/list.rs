@@ -61,6 +61,9 @@ impl List {
     fn datasets(&self) -> Result<Table> {
         let here = |d: &crate::datasets::Dataset| match (d.is_available(), &d.path) {
             (true, _) => "available".to_owned(),
+            (false, _) if d.reader().is_none() => {
+                format!("not available: nothing reads the layout {} yet", d.layout)
+            }
             (false, Some(path)) => {
                 let looked = std::path::absolute(path).unwrap_or_else(|_| path.clone());
                 format!("not available: looked in {}", looked.display())

@@ -1,6 +1,6 @@
 //! Datasets of the registry, loaded.
 
-use super::{Dataset, Layout};
+use super::Dataset;
 use skinsplat_data::Error;
 use skinsplat_data::folder::{Options, Subject};
 use skinsplat_synthetic as synthetic;
@@ -21,7 +21,7 @@ impl Dataset {
     /// # Errors
     /// Generator parameters that are out of range.
     pub fn subject_ids(&self) -> Result<Vec<String>, Error> {
-        if self.layout == Layout::Synthetic {
+        if self.is_generated() {
             return Ok(self.generators()?.into_keys().collect());
         }
         if !self.subjects.is_empty() {
@@ -42,7 +42,7 @@ impl Dataset {
             Error::invalid(path, "subject", id.to_owned(), format!("one of {}", ids.join(", ")))
         };
         let place = ids.iter().position(|own| own == id).ok_or_else(absent)?;
-        if self.layout == Layout::Synthetic {
+        if self.is_generated() {
             let parameters = self.generators()?.remove(id).ok_or_else(absent)?;
             let made = synthetic::Subject::new(&parameters).map_err(|e| self.invalid_parameters(e))?;
             let (train, test) = (made.train(), made.test());

@@ -4,7 +4,7 @@ mod load;
 
 use serde::{Deserialize, Serialize};
 use skinsplat_data::folder::{self, Options, Subject};
-use skinsplat_data::peoplesnapshot::{self, Split};
+use skinsplat_data::layouts::{LAYOUTS, Layout, Request, Split};
 use skinsplat_data::{Capture, Error, error};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
@@ -25,8 +25,9 @@ pub struct Dataset {
     pub id: String,
     /// What tables call it.
     pub title: String,
-    /// How it is stored.
-    pub layout: Layout,
+    /// How it is stored: `synthetic`, or the id of one of [`LAYOUTS`].
+    #[serde(deserialize_with = "known_layout")]
+    pub layout: String,
     /// How its subjects were captured.
     pub capture: Capture,
     /// Terms of use.
@@ -76,23 +77,11 @@ fn yes() -> bool {
     true
 }
 
-/// How a dataset is stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Layout {
-    /// Sequences with `transforms.json`; see [`folder`].
-    Folder,
-    /// Generated in-process.
-    Synthetic,
-    /// PeopleSnapshot as prepared for InstantAvatar; see [`peoplesnapshot`].
-    PeopleSnapshot,
-    /// NeuMan, as its authors publish it.
-    Neuman,
-    /// GalaBasketball, as its authors publish it.
-    GalaBasketball,
-    /// X-Humans, as its authors publish it.
-    XHumans,
-}
+/// The layout of data sets that are generated in-process.
+const GENERATED: &str = "synthetic";
+
+/// Layouts of data sets that the paper names and that nothing reads yet.
+const UNREAD: [&str; 3] = ["neuman", "galabasketball", "xhumans"];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -197,10 +186,25 @@ fn is_folder_name(name: &str) -> bool {
 }
 
 impl Dataset {
-    /// True if the data is there: always for synthetic datasets, else if the folder of every subject exists.
+    /// True if its subjects are generated in-process.
+    pub fn is_generated(&self) -> bool {
+        self.layout == GENERATED
+    }
+
+    /// What reads its subjects; none if they are generated, or if nothing reads its layout yet.
+    pub fn reader(&self) -> Option<&'static Layout> {
+        Layout::named(&self.layout)
+    }
+
+    /// True if the data is there: always if it is generated, else if its layout is read and the folder of every subject
+    /// exists.
     pub fn is_available(&self) -> bool {
-        self.layout == Layout::Synthetic
-            || self.subject_folders().is_some_and(|folders| folders.iter().all(|folder| folder.is_dir()))
+        self.is_generated() || (self.reader().is_some() && self.is_present())
+    }
+
+    /// True if the folder of every subject exists, whether or not anything reads it.
+    pub fn is_present(&self) -> bool {
+        self.subject_folders().is_some_and(|folders| folders.iter().all(|folder| folder.is_dir()))
     }
 
     /// The subjects' folders; `None` without a path.
@@ -222,27 +226,26 @@ impl Dataset {
     pub fn load_subject(&self, folder: &Path, options: &Options) -> Result<Subject, Error> {
         let mut options = options.clone();
         options.model = options.model.or_else(|| self.model.clone());
-        match self.layout {
-            Layout::Folder => Subject::load(folder, &options),
-            Layout::PeopleSnapshot => {
-                let name = folder.file_name().unwrap_or_default().to_string_lossy();
-                let split = self.splits.get(name.as_ref()).ok_or_else(|| {
-                    let expected = "splits.<subject> = { train = [first, last, step], test = ... }";
-                    Error::invalid(folder, format!("splits.{name}"), "missing", expected)
-                })?;
-                peoplesnapshot::load(folder, split, &options)
-            }
-            layout => {
-                let problem = format!("no reader for {layout:?}").to_lowercase();
-                Err(Error::invalid(
-                    folder,
-                    "layout",
-                    problem,
-                    "folder or peoplesnapshot (convert the data first)",
-                ))
-            }
-        }
+        let Some(reader) = self.reader() else {
+            let known: Vec<&str> = LAYOUTS.iter().map(|layout| layout.id).collect();
+            let expected = format!("{} (convert the data first)", known.join(" or "));
+            return Err(Error::invalid(folder, "layout", format!("no reader for {}", self.layout), expected));
+        };
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        let split = self.splits.get(name.as_ref());
+        (reader.load)(&Request { folder, split, options: &options })
     }
+}
+
+/// A layout that somebody has heard of.
+fn known_layout<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let id = String::deserialize(deserializer)?;
+    let known = || [GENERATED].into_iter().chain(LAYOUTS.iter().map(|layout| layout.id)).chain(UNREAD);
+    if known().any(|known| known == id) {
+        return Ok(id);
+    }
+    let known: Vec<&str> = known().collect();
+    Err(serde::de::Error::custom(format!("layout: {id:?}; expected one of {}", known.join(", "))))
 }
 
 fn line_of(text: &str, offset: usize) -> usize {
@@ -254,7 +257,7 @@ fn found(folder: &Path) -> Result<Dataset, Error> {
     Ok(Dataset {
         title: id.clone(),
         id,
-        layout: Layout::Folder,
+        layout: "folder".to_owned(),
         capture: folder::inspect(folder)?,
         licence: "see the data".to_owned(),
         provenance: "found by scanning a folder".to_owned(),

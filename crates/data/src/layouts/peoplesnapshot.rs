@@ -9,27 +9,24 @@
 //! ```
 //! The two pose files of a subject may hold different betas; each split keeps its own.
 
-use super::Capture;
-use super::folder::{Models, Options, Subject};
-use super::{Error, FrameRef, FrameSource, Sequence, camera, poses};
-use serde::{Deserialize, Serialize};
+use super::{Layout, Request};
+use crate::folder::{Models, Subject};
+use crate::{Capture, Error, FrameRef, FrameSource, Sequence, camera, poses};
 use std::path::{Path, PathBuf};
 
-/// Which video frames are trained on and which are held out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Split {
-    /// First frame, last frame (inclusive), step.
-    pub train: [usize; 3],
-    /// First frame, last frame (inclusive), step.
-    pub test: [usize; 3],
-}
+pub(super) const LAYOUT: Layout = Layout {
+    id: "peoplesnapshot",
+    summary: "PeopleSnapshot as prepared for InstantAvatar: cameras.npz, images, masks, poses.npz or refined poses",
+    load,
+};
 
-/// Loads the two sequences, `train` and `test`, of a subject; no image is decoded.
+/// Loads the two sequences, `train` and `test`, of a subject.
 ///
 /// # Errors
-/// Missing files, no body model in `options`, a split that leaves the video, poses that do not match it.
-pub fn load(folder: &Path, split: &Split, options: &Options) -> Result<Subject, Error> {
+/// Missing files, no split or body model, a split that leaves the video, poses that do not match it.
+fn load(request: &Request<'_>) -> Result<Subject, Error> {
+    let Request { folder, options, .. } = *request;
+    let split = request.required_split()?;
     let mut models = Models::new(folder, options);
     let mut sequence = |id: &str, range: [usize; 3]| sequence(folder, id, range, &mut models);
     let (train, test) = (vec![sequence("train", split.train)?], vec![sequence("test", split.test)?]);
