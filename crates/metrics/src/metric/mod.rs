@@ -5,6 +5,7 @@
 
 mod id;
 mod lpips;
+mod mae;
 mod measure;
 mod psnr;
 mod splats;
@@ -16,4 +17,4 @@ pub use measure::{AvatarStats, FrameInput, Measure, Measured, Metric, OverFrames
 pub use values::Values;
 
 /// Every metric, in the order in which documents and lists name them.
-pub const METRICS: &[Metric] = &[psnr::METRIC, ssim::METRIC, lpips::METRIC, splats::METRIC];
+pub const METRICS: &[Metric] = &[psnr::METRIC, ssim::METRIC, lpips::METRIC, splats::METRIC, mae::METRIC];
