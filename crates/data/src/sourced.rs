@@ -33,7 +33,7 @@ impl fmt::Display for SourceDigest {
 
 /// A value and, where the value is not what is stored itself, the digest of what it was computed from. It cannot be changed
 /// in place: another value is another [`Sourced`], made by `from`, whose own numbers count.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sourced<T> {
     value: Arc<T>,
     source: Option<SourceDigest>,

@@ -312,7 +312,12 @@ fn quad_neighbours(count: usize, quads: &[[u32; 4]]) -> Vec<Vec<u32>> {
 fn split(vertices: &[DVec3], quads: &[[u32; 4]]) -> Vec<[u32; 3]> {
     let smallest_angle = |face: [u32; 3]| {
         let p = face.map(|i| vertices[i as usize]);
-        (0..3).map(|k| (p[(k + 1) % 3] - p[k]).angle_between(p[(k + 2) % 3] - p[k])).fold(4.0, f64::min)
+        let angle = |k: usize| {
+            let (u, v) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
+            let cosine = u.dot(v) / (u.length_squared() * v.length_squared()).sqrt();
+            portable::acos(cosine.clamp(-1.0, 1.0))
+        };
+        (0..3).map(angle).fold(4.0, f64::min)
     };
     let triangles = |&[a, b, c, d]: &[u32; 4]| {
         let (one, other) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);

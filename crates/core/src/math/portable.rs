@@ -77,13 +77,13 @@ pub fn powi<T: Real>(x: T, n: i32) -> T {
     let (mut square, mut left, mut power) = (x, n.unsigned_abs(), T::ONE);
     loop {
         if left & 1 == 1 {
-            power = power * square;
+            power *= square;
         }
         left >>= 1;
         if left == 0 {
             break;
         }
-        square = square * square;
+        square *= square;
     }
     if n < 0 { T::ONE / power } else { power }
 }
