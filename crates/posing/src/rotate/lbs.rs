@@ -4,7 +4,7 @@ use super::super::lanes::{
     LANES, Lanes, identity, matrix, multiply, product, put, put_matrix, splat, take, transposed,
 };
 use super::{BlockInput, Rotated};
-use skinsplat_core::math::{Quaternion, dot4, matrix3, rotation};
+use skinsplat_core::math::{Matrix3, Quaternion, dot4, matrix3, rotation};
 
 /// How the blend B is made a rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -143,8 +143,11 @@ pub(super) fn converted_adjoint(
     }
     let mut result = [[0.0; LANES]; 4];
     for lane in 0..LANES {
-        let torque = torque.map(|torque| [0, 1, 2].map(|axis: usize| torque[axis][lane]));
-        put(&mut result, lane, lane_adjoint(raw_is_drawn, input, rotated, take(posed, lane), torque, lane));
+        let (b, canonical) = (input.blend.matrix(lane), take(&input.block.rotations, lane));
+        let torque = torque
+            .map(|torque| ([0, 1, 2].map(|axis: usize| torque[axis][lane]), take(&rotated.relative, lane)));
+        let of_lane = lane_adjoint(raw_is_drawn, b, canonical, take(posed, lane), torque);
+        put(&mut result, lane, of_lane);
     }
     result
 }
@@ -191,26 +194,23 @@ impl pulp::NullaryFnOnce for ConvertAdjoint<'_> {
     }
 }
 
-/// One lane, whatever it holds.
+/// One lane, whatever it holds. With a torque comes R, which it is a derivative by.
 fn lane_adjoint(
     raw_is_drawn: bool,
-    input: &BlockInput<'_>,
-    rotated: &Rotated,
+    b: Matrix3<f32>,
+    canonical: Quaternion<f32>,
     of_posed: Quaternion<f32>,
-    torque: Option<[f32; 3]>,
-    lane: usize,
+    torque: Option<([f32; 3], Quaternion<f32>)>,
 ) -> Quaternion<f32> {
-    let canonical = take(&input.block.rotations, lane);
-    let b = input.blend.matrix(lane);
     let turned = matrix3::multiply(b, rotation::quaternion_to_matrix_raw(canonical));
     let raw = rotation::matrix_to_quaternion_raw(turned);
     let Some(unit) = rotation::normalize(raw) else { return of_posed };
     let of_length = |of_unit| rotation::adjoint::normalize(unit, 1.0 / dot4(unit, raw), of_unit);
     let mut of_raw = if raw_is_drawn { of_posed } else { of_length(of_posed) };
     let mut of_canonical = [0.0; 4];
-    if let Some(torque) = torque {
+    if let Some((torque, relative)) = torque {
         // R = unit ⊗ R_c⁻¹: rotating R_c on rotates R back, seen from where R starts.
-        let relative = rotation::conjugate(take(&rotated.relative, lane));
+        let relative = rotation::conjugate(relative);
         let back = matrix3::apply(rotation::quaternion_to_matrix_raw(relative), torque).map(|t| -t);
         of_raw = sum(of_raw, of_length(rotation::adjoint::from_torque(unit, torque)));
         of_canonical = rotation::adjoint::from_torque(canonical, back);
@@ -229,4 +229,43 @@ fn sum(a: Quaternion<f32>, b: Quaternion<f32>) -> Quaternion<f32> {
 fn nearest(input: &BlockInput<'_>, lane: usize) -> Quaternion<f32> {
     rotation::unique_polar_of_rounded(input.blend.matrix(lane))
         .map_or_else(|| input.average_of(lane), |q| q.map(|c| c as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skinsplat_core::math::random::SplitMix64;
+
+    /// The bits of the functions of one matrix, for any blend on every branch.
+    #[test]
+    fn lanes_have_the_bits_of_single_matrices() {
+        let mut random = SplitMix64::new(5);
+        let mut number = || 2.0 * random.unit_f32() - 1.0;
+        for _ in 0..500 {
+            let blend: [Lanes; 9] = std::array::from_fn(|_| std::array::from_fn(|_| number()));
+            let posed: [Lanes; 4] = std::array::from_fn(|_| std::array::from_fn(|_| number()));
+            let mut canonical = identity();
+            for lane in 0..LANES {
+                let q = [number(), number(), number(), number()];
+                put(&mut canonical, lane, rotation::normalize(q).unwrap());
+            }
+            let arch = pulp::Arch::default();
+            let found = arch.dispatch(Convert { blend: &blend, canonical: &canonical });
+            let adjoints = [true, false].map(|raw_is_drawn| {
+                let convert = Convert { blend: &blend, canonical: &canonical };
+                arch.dispatch(ConvertAdjoint { convert, raw_is_drawn, posed: &posed }).unwrap()
+            });
+            for lane in 0..LANES {
+                let (b, own) = (matrix(&blend, lane), take(&canonical, lane));
+                let turned = matrix3::multiply(b, rotation::quaternion_to_matrix_raw(own));
+                let raw = rotation::matrix_to_quaternion_raw(turned);
+                assert_eq!(take(&found.raw, lane), raw);
+                assert_eq!(take(&found.unit, lane), rotation::normalize(raw).unwrap());
+                for (raw_is_drawn, adjoint) in [true, false].into_iter().zip(&adjoints) {
+                    let expected = lane_adjoint(raw_is_drawn, b, own, take(&posed, lane), None);
+                    assert_eq!(take(adjoint, lane), expected);
+                }
+            }
+        }
+    }
 }

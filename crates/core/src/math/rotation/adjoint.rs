@@ -25,11 +25,10 @@ pub fn quaternion_to_matrix_raw<T: Real>([w, x, y, z]: Quaternion<T>, g: &Matrix
 pub fn matrix_to_quaternion_raw<T: Real>(m: Matrix3<T>, g: Quaternion<T>) -> Matrix3<T> {
     let Leading { row: outer, own, best } = leading(&four_outer_product(m));
     let (half, squared) = (T::ONE / (T::from_f64(2.0) * own), own * own);
-    let of_best = |row: [T; 4]| match best {
-        [true, ..] => row[0],
-        [_, true, ..] => row[1],
-        [_, _, true, _] => row[2],
-        _ => row[3],
+    let of_best = |row: [T; 4]| {
+        let low = if best[1] { row[1] } else { row[0] };
+        let high = if best[3] { row[3] } else { row[2] };
+        if best[2] | best[3] { high } else { low }
     };
     // p_best = √s / 2 and p_j = o_j / (2 √s) with s on the diagonal and o_j beside it.
     let along = (dot4(g, outer) - of_best(g) * of_best(outer)) * half;
