@@ -200,8 +200,8 @@ fn the_embedded_registry_names_what_is_there() {
     }
     let people = registry.get("peoplesnapshot").unwrap();
     assert_eq!(
-        (people.layout, people.subjects.len(), people.splits.len()),
-        ("peoplesnapshot".to_owned(), 4, 4)
+        (people.layout.as_str(), people.subjects.len(), people.splits.len()),
+        ("peoplesnapshot", 4, 4)
     );
     let error = registry.get("nothing").unwrap_err().to_string();
     assert!(
