@@ -99,9 +99,9 @@ fn list_names_everything_that_can_be_chosen() {
     }
     // The same table in every format.
     for (format, line) in [
-        ("markdown", "| psnr | table column PSNR |"),
-        ("csv", "psnr,table column PSNR"),
-        ("latex", "psnr & table column PSNR \\\\"),
+        ("markdown", "| psnr | table column PSNR: peak signal-to-noise ratio |"),
+        ("csv", "psnr,table column PSNR: peak signal-to-noise ratio"),
+        ("latex", "psnr & table column PSNR: peak signal-to-noise ratio \\\\"),
     ] {
         let listed = desk.ok(args!["list", "metrics", "--format", format]);
         assert!(listed.lines().any(|l| l == line), "{listed}");

@@ -35,7 +35,7 @@ fn results(desk: &Desk, out: &str) -> Value {
 
 /// PSNR of a variant of the first sequence.
 fn psnr(results: &Value, variant: usize) -> f64 {
-    results["tables"][0]["sequences"][0]["variants"][variant]["summary"]["psnr"].as_f64().unwrap()
+    results["tables"][0]["sequences"][0]["variants"][variant]["summary"]["values"]["psnr"].as_f64().unwrap()
 }
 
 /// A registry of the small subject with an avatar named `hers`, and an experiment whose second variant asks for it.

@@ -18,9 +18,10 @@ fn avatar() -> PathBuf {
         let desk = Desk::new();
         desk.put("tiny.toml", include_str!("tiny.toml"));
         desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1", "--variant", "skinned"]);
-        let mut files = std::fs::read_dir(desk.path("run/avatars")).unwrap();
-        let path = files.next().unwrap().unwrap().path();
-        assert!(files.next().is_none());
+        let files = std::fs::read_dir(desk.path("run/avatars")).unwrap().map(|file| file.unwrap().path());
+        let mut avatars = files.filter(|path| path.extension().is_some_and(|extension| extension == "ply"));
+        let path = avatars.next().unwrap();
+        assert!(avatars.next().is_none());
         (desk, path)
     };
     DESK.get_or_init(make).1.clone()

@@ -156,5 +156,5 @@ fn the_built_in_registry_looks_in_the_current_folder() {
     assert!(line(&text, "snapshot_ava ").ends_with(&expected), "{text}");
     assert!(line(&text, "synthetic ").ends_with("available"), "{text}");
     copy(&data("small/tiny"), &place);
-    assert!(line(&listed(&desk), "snapshot_ava ").ends_with("; available"), "{text}");
+    assert!(line(&listed(&desk), "snapshot_ava ").ends_with("  available"), "{text}");
 }

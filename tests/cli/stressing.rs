@@ -13,7 +13,7 @@ fn a_quick_examination_writes_its_report_and_pictures() {
     }
     assert!(!shown.contains("Solvers on hard averages") && !shown.contains("NaN"));
     let report: serde_json::Value = serde_json::from_str(&desk.read("report/stress.json")).unwrap();
-    assert_eq!(report["schema"], "stress-1");
+    assert_eq!(report["schema"], "stress-2");
     let pictures = report["pictures"].as_array().unwrap();
     assert!(!pictures.is_empty());
     for picture in pictures {

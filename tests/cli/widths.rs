@@ -49,7 +49,7 @@ fn levels_that_cannot_be_given_are_refused_in_one_line() {
     let expected = format!("expected one of {}", Level::Scalar);
     let missing = Level::ALL.into_iter().filter(|level| level.arch().is_none()).map(Level::name);
     for level in ["sse2", "AVX2", ""].into_iter().chain(missing) {
-        run(&desk, level, args!["list"]).refuses(&[VARIABLE, &expected], level);
+        run(&desk, level, args!["list", "strategies"]).refuses(&[VARIABLE, &expected], level);
     }
-    run(&desk, "scalar", args!["list"]).exits(0, "scalar");
+    run(&desk, "scalar", args!["list", "strategies"]).exits(0, "scalar");
 }

@@ -114,7 +114,9 @@ impl Archive {
     }
 
     fn missing(&self, name: &str, expected: &str) -> Error {
-        self.invalid(name, format!("missing; the archive holds {}", self.names().join(", ")), expected)
+        // Names are whatever the archive says: one line in any case.
+        let names: Vec<String> = self.names().iter().map(|name| name.escape_debug().to_string()).collect();
+        self.invalid(name, format!("missing; the archive holds {}", names.join(", ")), expected)
     }
 
     fn check_shape(&mut self, name: &str, shape: &[usize], pattern: &str) -> Result<(), Error> {

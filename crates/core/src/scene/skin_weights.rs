@@ -97,7 +97,8 @@ impl SkinWeights {
 /// That the weights of row `i` are usable and sum to one.
 fn check_row(i: usize, weights: &[f32]) -> Result<(), SceneError> {
     weights.iter().try_for_each(|&weight| check_weight(i, weight))?;
-    let sum: f64 = weights.iter().map(|&weight| f64::from(weight)).sum();
+    // An empty `sum` is -0.
+    let sum = weights.iter().fold(0.0, |sum, &weight| sum + f64::from(weight));
     if (sum - 1.0).abs() > SkinWeights::SUM_TOLERANCE {
         return Err(SceneError::new(format!("weights[{i}]"), format!("sum {sum}"), "a sum of 1"));
     }
