@@ -31,7 +31,7 @@ impl Archive {
     /// # Errors
     /// A file that cannot be read or is no zip archive.
     pub fn open(path: &Path, what: &str) -> Result<Self, Error> {
-        let open = || Ok::<_, zip::result::ZipError>(ZipArchive::new(BufReader::new(File::open(path)?))?);
+        let open = || ZipArchive::new(BufReader::new(File::open(path)?));
         let inner =
             open().map_err(|cause| Error::read(path, what, "a .npz archive of arrays", cause.into()))?;
         Ok(Self { path: path.to_owned(), inner, extents: BTreeMap::new() })

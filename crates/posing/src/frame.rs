@@ -165,7 +165,9 @@ impl<V: Visitor> pulp::WithSimd for Walk<'_, '_, V> {
 /// That there is a unit quaternion for each of n Gaussians.
 fn check_rotations(rotations: &[Quaternion<f32>], n: usize) -> Result<(), SceneError> {
     expect_count("rotations", rotations.len(), n)?;
-    let off = |q: &Quaternion<f32>| !((dot4(*q, *q) - 1.0).abs() <= UNIT_TOLERANCE);
+    let off = |q: &Quaternion<f32>| {
+        (dot4(*q, *q) - 1.0).abs().partial_cmp(&UNIT_TOLERANCE).is_none_or(std::cmp::Ordering::is_gt)
+    };
     match rotations.iter().position(off) {
         Some(i) => {
             let problem = format!("{:?}", rotations[i]);

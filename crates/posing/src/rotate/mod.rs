@@ -211,6 +211,9 @@ impl From<RotationChoice> for String {
     }
 }
 
+/// R of a block's lanes, as unit quaternions.
+type BlockRotations<'a> = dyn Fn(&BlockInput<'_>) -> [Lanes; 4] + Sync + 'a;
+
 /// What R is read from in one pose, besides the blend.
 pub(crate) enum Source<'a> {
     /// Nothing: no Gaussian moves, or nobody asks how it is rotated.
@@ -224,7 +227,7 @@ pub(crate) enum Source<'a> {
     /// One rotation per face.
     Faces(FaceRotations<'a>),
     /// Anything else: R of each lane, as unit quaternions.
-    PerBlock(Box<dyn Fn(&BlockInput<'_>) -> [Lanes; 4] + Sync + 'a>),
+    PerBlock(Box<BlockRotations<'a>>),
 }
 
 impl<'a> Source<'a> {
