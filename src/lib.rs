@@ -18,10 +18,8 @@
 //! pixel centres at +0.5.
 //!
 //! # Layers
-//! A module imports only from modules above it in this list (`tests/architecture.rs` reads the imports):
-//! [`math`] → [`scene`] → [`strategy`], [`render`], [`metrics`] → [`data`] → [`experiment`] → [`fit`], [`run`],
-//! [`report`], [`trade`] → [`cli`].
-#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+//! The harness's modules, lowest first: [`datasets`] → [`experiment`] → [`run`] → [`report`] → [`cli`]; `tests/architecture.rs`
+//! reads the imports. They stand on crates of their own, which anybody may use alone: ARCHITECTURE.md draws them.
 
 pub mod cli;
 pub mod datasets;

@@ -17,7 +17,7 @@
 //! | [`frames`] | PNG, JPEG and `.npy` images and masks |
 //! | [`npy`], [`npz`] | NumPy arrays |
 //! | [`folder`] | a subject as a folder of sequences |
-//! | [`peoplesnapshot`] | PeopleSnapshot as prepared for InstantAvatar |
+//! | [`layouts`] | data sets as others store them: PeopleSnapshot as prepared for InstantAvatar |
 //! | [`sequence`] | posed frames with their cameras, decoded when asked for |
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 

@@ -14,7 +14,7 @@ pub struct PoseOptions<'a> {
     /// The signs of a sequence, which [`RotationChoice::LiftedSum`](super::RotationChoice::LiftedSum) reads; `None` takes
     /// those from rest. Other strategies have no use for it.
     pub lift: Option<&'a JointLift>,
-    /// A rotation of one's own for every Gaussian, in place of what [`Strategy::rotation`] makes: R, relative to the
+    /// A rotation of one's own for every Gaussian, in place of what [`Strategy::rotation`](crate::Strategy::rotation) makes: R, relative to the
     /// canonical orientation, as unit quaternions (w, x, y, z). Means follow Eq. 6, or the mesh for face-bound Gaussians;
     /// covariances, SH and view frames follow R. In the adjoint R is a constant.
     pub rotations: Option<&'a [Quaternion<f32>]>,
