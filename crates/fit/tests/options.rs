@@ -30,6 +30,7 @@ fn other(path: &str, value: &Value) -> String {
         Value::Bool(on) => (!on).to_string(),
         Value::Number(number) if path == "sh_degree" => (3 - number.as_u64().unwrap()).to_string(),
         Value::Number(number) if number.is_f64() && path == "densify.from" => "0.01".to_owned(),
+        Value::Number(number) if path == "densify.most" => (number.as_f64().unwrap() + 1.0).to_string(),
         Value::Number(number) if number.is_f64() => (0.7 * number.as_f64().unwrap() + 1.7e-3).to_string(),
         Value::Number(number) => (number.as_u64().unwrap() + 1).to_string(),
         _ => unreachable!("only numbers and switches are varied"),
