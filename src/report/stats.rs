@@ -124,7 +124,7 @@ mod tests {
     /// Blocks make the interval of correlated frames wider than drawing single frames would.
     #[test]
     fn correlated_frames_widen_the_interval() {
-        let smooth: Vec<f64> = (0..64).map(|i| (f64::from(i) * 0.2).sin()).collect();
+        let smooth: Vec<f64> = (0..64).map(|i| portable::sin(f64::from(i) * 0.2)).collect();
         let shuffled: Vec<f64> = (0..64).map(|i| smooth[(i * 37) % 64]).collect();
         let width = |values: &[f64]| {
             let [low, high] =
