@@ -9,7 +9,7 @@ use files::Values;
 use skinsplat::datasets::Registry;
 use skinsplat_core::scene::{Image, Mask, SceneError};
 use skinsplat_data::folder::Options;
-use skinsplat_data::{Capture, FrameSource, Subject, folder, frames, npy};
+use skinsplat_data::{Capture, FrameFiles, FrameSource, Subject, folder, frames, npy};
 use std::path::{Path, PathBuf};
 
 fn subject(name: &str) -> PathBuf {
@@ -116,7 +116,11 @@ fn clothing_is_worn_only_on_request() {
 fn truth_is_straight_colour_and_the_mask() {
     let subject = Subject::load(&subject("snapshot_ava"), &Options::default()).unwrap();
     let truth = subject.test[0].truth(0).unwrap();
-    let FrameSource::Files { image, mask: Some(mask) } = &subject.test[0].frames[0].source else { panic!() };
+    let FrameSource::Files(FrameFiles { image, mask: Some(mask), .. }) = &subject.test[0].frames[0].source
+    else {
+        panic!()
+    };
+    let mask = &mask.path;
     let (rgb, alpha) = frames::load_image(image).unwrap();
     assert_eq!((truth.rgb, Some(&truth.alpha)), (rgb, alpha.as_ref()), "mask and alpha are the same here");
     assert_eq!(frames::load_mask(mask).unwrap(), truth.alpha);
@@ -201,7 +205,7 @@ fn the_embedded_registry_names_what_is_there() {
     let people = registry.get("peoplesnapshot").unwrap();
     assert_eq!(
         (people.layout.as_str(), people.subjects.len(), people.splits.len()),
-        ("peoplesnapshot", 4, 4)
+        ("peoplesnapshot", 4, 0)
     );
     let error = registry.get("nothing").unwrap_err().to_string();
     assert!(
@@ -333,7 +337,12 @@ fn peoplesnapshot_splits_its_video() {
     let truth = loaded.test[0].truth(1).unwrap();
     assert_eq!((truth.rgb.at(0, 0)[0], truth.alpha.at(3, 3)), (5.0 / 255.0, 1.0));
     std::fs::remove_file(subject.join("masks/mask_0005.npy")).unwrap();
-    assert_eq!(load().unwrap_err().field(), "masks");
+    let error = load().unwrap_err();
+    assert_eq!(error.field(), "masks");
+    assert!(
+        error.to_string().contains("masks: frame 5 is missing; expected a file like mask_0000.npy"),
+        "{error}"
+    );
     std::fs::remove_file(subject.join("images/image_0005.png")).unwrap();
     assert_eq!(load().unwrap_err().field(), "split.test");
 }

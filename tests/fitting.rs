@@ -187,12 +187,12 @@ struct Broken {
 }
 
 impl FrameGenerator for Broken {
-    fn truth(&self, frame: usize) -> Truth {
-        self.truths[frame].clone()
+    fn truth(&self, frame: usize) -> Result<Truth, skinsplat_data::Error> {
+        Ok(self.truths[frame].clone())
     }
 
-    fn key(&self) -> String {
-        "broken".to_owned()
+    fn key(&self) -> Result<String, skinsplat_data::Error> {
+        Ok("broken".to_owned())
     }
 }
 

@@ -11,7 +11,9 @@ use files::Values;
 use proptest::prelude::*;
 use skinsplat::datasets::Registry;
 use skinsplat_core::scene::{Avatar, Binding, FaceBinding, Gaussians, Image, Mask, SkinWeights};
+use skinsplat_data::avatar::read_avatar;
 use skinsplat_data::folder::Options;
+use skinsplat_data::pickle::Pickle;
 use skinsplat_data::ply::{self, Encoding, Metadata};
 use skinsplat_data::{Error, Subject, body, camera, frames, npy, poses};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -226,6 +228,35 @@ fn ply() {
 }
 
 #[test]
+fn avatars_of_other_programs() {
+    for (name, cases) in [
+        ("base.compressed.ply", 600),
+        ("six_big_endian.ply", 1500),
+        ("six_ascii.ply", 600),
+        ("gaussians.npz", 1000),
+        ("gaussians_logs.npz", 600),
+        ("gsplat.pt", 1500),
+        ("capture.pth", 600),
+        ("haha.ckpt", 1500),
+    ] {
+        fuzz(cases, &support::data("small/avatars").join(name), |path| nothing(read_avatar(path)));
+    }
+}
+
+#[test]
+fn cameras_of_other_programs() {
+    let lens = r#""w": 64, "h": 48, "fl_x": 60.5, "cx": 32, "cy": 24, "k1": 0.5, "camera_angle_x": 0.5"#;
+    let frame = r#"{"file_path": "a", "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0.5], [0, 0, 1, 3], [0, 0, 0, 1]]}"#;
+    let trained = r#"[{"id": 0, "width": 64, "height": 48, "position": [0, 0.5, 1], "fx": 60, "fy": 61,
+        "rotation": [[1, 0, 0], [0, -1, 0], [0, 0, -1]]}]"#;
+    for text in [format!("{{{lens}, \"frames\": [{frame}]}}"), trained.to_owned()] {
+        let (_folder, path) = temporary("cameras.json");
+        std::fs::write(&path, text).unwrap();
+        fuzz(1500, &path, |path| nothing(camera::load_views(path)));
+    }
+}
+
+#[test]
 fn npy_and_images_in_it() {
     let (_folder, path) = temporary("image.npy");
     frames::save_npy(&path, &Image::filled(5, 4, [0.5, 0.25, 1.0])).unwrap();
@@ -244,6 +275,25 @@ fn npz_bodies_and_poses() {
         &[("thetas", &[2, 6], poses_of(12)), ("transl", &[2, 3], poses_of(6)), ("betas", &[1], poses_of(1))],
     );
     fuzz(2000, &path, |path| nothing(poses::load(path)));
+}
+
+#[test]
+fn pickled_bodies_and_poses() {
+    for body_file in ["smpl.pkl", "smpl_select.pkl"] {
+        fuzz(1000, &support::data("small/bodies").join(body_file), |path| nothing(body::load(path)));
+    }
+    fuzz(2000, &support::data("small/bodies/aist_poses.pkl"), |path| nothing(poses::load(path)));
+    for values in ["python2_0.pkl", "python3_0.pkl", "python3_2.pkl", "python3_4.pkl", "joblib.pkl"] {
+        fuzz(1000, &support::data("small/pickles").join(values), |path| {
+            let file = Pickle::read(path, "values")?;
+            for key in file.root().keys()? {
+                if let Ok(field) = file.get(&key) {
+                    let _ = (field.array().is_ok(), field.rows().is_ok(), field.texts().is_ok());
+                }
+            }
+            Ok(())
+        });
+    }
 }
 
 #[test]
@@ -268,9 +318,15 @@ fn gltf_text() {
     let (folder, path) = temporary("rig.gltf");
     let buffer = folder.path().join("rig.bin");
     std::fs::write(&buffer, &bytes[28 + length..]).unwrap();
-    json["buffers"][0]["uri"] = buffer.to_str().unwrap().into();
+    json["buffers"][0]["uri"] = "rig.bin".into();
     std::fs::write(&path, json.to_string()).unwrap();
-    fuzz(1500, &path, |path| nothing(body::load(path)).and(nothing(poses::load_clip(path, Some("twist")))));
+    fuzz(1500, &path, |path| {
+        let beside = path.with_file_name("rig.bin");
+        if !beside.exists() {
+            std::fs::copy(&buffer, beside).unwrap();
+        }
+        nothing(body::load(path)).and(nothing(poses::load_clip(path, Some("twist"))))
+    });
 }
 
 #[test]

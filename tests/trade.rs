@@ -10,9 +10,9 @@ mod support;
 use glam::DVec3;
 use program::Desk;
 use serde_json::Value;
-use skinsplat_core::scene::{Avatar, Binding, Camera, RestBody};
+use skinsplat_core::scene::{Avatar, Camera, RestBody};
 use skinsplat_data::frames::load_image;
-use skinsplat_data::{Capture, FrameRef, FrameSource, Sequence, Subject, ply};
+use skinsplat_data::{Capture, FrameFiles, FrameRef, FrameSource, Sequence, Subject, ply};
 use skinsplat_study::trade::{self, Options, SWEEPS, Stage, Trade};
 use skinsplat_table::{Cell, Content};
 use std::collections::BTreeSet;
@@ -190,8 +190,9 @@ fn subject(body: &RestBody) -> Subject {
     let camera = Camera::look_at(eye, DVec3::new(0.5, 0.0, 0.0), DVec3::Y, 60.0, 64, 48);
     let poses =
         (0..3).map(|k| skinsplat_core::scene::Pose { translation: DVec3::ZERO, ..rig::bent(body, k, 0.5) });
-    let source = || FrameSource::Files { image: "none.png".into(), mask: None };
-    let frame = |pose: usize| FrameRef { name: format!("{pose}"), pose, camera: 0, source: source() };
+    let source = || FrameSource::Files(FrameFiles { image: "none.png".into(), mask: None, background: None });
+    let frame =
+        |pose: usize| FrameRef { name: format!("{pose}"), time: pose, pose, camera: 0, source: source() };
     let sequence = Sequence {
         id: "test".to_owned(),
         body: Arc::new(body.clone()),
@@ -200,7 +201,13 @@ fn subject(body: &RestBody) -> Subject {
         frames: (0..3).map(frame).collect(),
         stored_sizes: None,
     };
-    Subject { id: "tube".to_owned(), capture: Capture::Monocular, train: Vec::new(), test: vec![sequence] }
+    Subject {
+        id: "tube".to_owned(),
+        capture: Capture::Monocular,
+        train: Vec::new(),
+        test: vec![sequence],
+        notes: Vec::new(),
+    }
 }
 
 fn stage(body: &RestBody, gaussians: usize) -> Stage {
@@ -254,13 +261,9 @@ fn bad_input_is_one_line() {
     desk.put("bad.ply", "ply\nnonsense");
     quick(args!["--avatar", "bad.ply"]).refuses(&["bad.ply"], "not an avatar");
     let gaussians = rig::on_vertices(&rig::body(), 5, 1).gaussians;
-    let fixed = Avatar { gaussians: gaussians.clone(), binding: Binding::Static };
     let other = Avatar { gaussians, binding: rig::on_faces(&many_faces(), 5, 1).binding };
-    for (name, avatar) in [("static.ply", &fixed), ("other.ply", &other)] {
-        let path = desk.path(name);
-        ply::write_avatar(&path, avatar, &ply::Metadata::default(), ply::Encoding::LittleEndian).unwrap();
-    }
-    quick(args!["--avatar", "static.ply"]).refuses(&["static.ply", "does not move"], "no binding");
+    let path = desk.path("other.ply");
+    ply::write_avatar(&path, &other, &ply::Metadata::default(), ply::Encoding::LittleEndian).unwrap();
     quick(args!["--avatar", "other.ply"]).refuses(&["other.ply", "face"], "another body");
     quick(args!["--avatar", "other.ply", "--recipe", "surface-face"]).refuses(&["--recipe"], "both");
     desk.run(args!["trade", "--only", "speed"]).refuses(&["speed", "solver, influences"], "unknown table");

@@ -1,11 +1,11 @@
 //! Which data a command looks at.
 
 use crate::datasets::{Dataset, Registry};
-use crate::experiment::{AvatarRecipe, Experiment};
+use crate::experiment::{AvatarRecipe, Experiment, Unreadable};
 use crate::run::{Library, LoadedDataset, RegisteredAvatar};
 use anyhow::{Result, bail};
-use skinsplat_data::Subject;
 use skinsplat_data::folder::Options;
+use skinsplat_data::{Error, Subject};
 use std::path::{Path, PathBuf};
 
 /// The registry of a folder.
@@ -72,6 +72,29 @@ impl Data {
         }
     }
 
+    /// Every subject of a data set, one of them by `DATASET/SUBJECT`, or every subject that is there; each as
+    /// `DATASET/SUBJECT`, or why it cannot be loaded.
+    pub(super) fn subjects(&self, name: Option<&str>) -> Result<Vec<(String, Result<Subject, Error>)>> {
+        let registry = self.registry()?;
+        let (dataset, subject) = match name.map(|name| name.split_once('/').unwrap_or((name, ""))) {
+            Some((dataset, subject)) => (Some(dataset), Some(subject).filter(|subject| !subject.is_empty())),
+            None => (None, None),
+        };
+        let mut found = Vec::new();
+        for dataset in wanted(&registry, dataset)? {
+            let ids = dataset.subject_ids()?;
+            if let Some(subject) = subject
+                && !ids.iter().any(|id| id == subject)
+            {
+                bail!("{}: no subject `{subject}`; expected one of {}", dataset.id, ids.join(", "));
+            }
+            for id in ids.iter().filter(|id| subject.is_none_or(|subject| *id == subject)) {
+                found.push((format!("{}/{id}", dataset.id), dataset.load_one(id, &self.options())));
+            }
+        }
+        Ok(found)
+    }
+
     /// `DATASET/SUBJECT` of the first subject that is there.
     pub(super) fn first_subject(&self) -> Result<Option<String>> {
         for dataset in wanted(&self.registry()?, None)? {
@@ -86,9 +109,16 @@ impl Data {
         Options { model: None, clothing: self.clothing }
     }
 
-    /// Loads the subjects of a data set, and which of its avatars the experiments name.
+    /// Loads the subjects of a data set, and which of its avatars the experiments name. A subject that cannot be loaded does
+    /// not keep the others from being used.
     fn load(&self, dataset: &Dataset, experiments: &[Experiment]) -> Result<LoadedDataset> {
-        let subjects = dataset.load(&self.options())?;
+        let (mut subjects, mut unreadable) = (Vec::new(), Vec::new());
+        for id in dataset.subject_ids()? {
+            match dataset.load_one(&id, &self.options()) {
+                Ok(subject) => subjects.push(subject),
+                Err(error) => unreadable.push(Unreadable { subject: id, problem: error.to_string() }),
+            }
+        }
         let named = |wanted: &str| {
             let recipes = experiments.iter().flat_map(|e| &e.variants).map(|variant| &variant.avatar);
             recipes.into_iter().any(|r| matches!(r, AvatarRecipe::File { name, .. } if name == wanted))
@@ -96,19 +126,32 @@ impl Data {
         let avatars = dataset.avatars.iter().filter(|avatar| named(&avatar.name));
         let avatars = avatars.map(|a| RegisteredAvatar { name: a.name.clone(), path: a.path.clone() });
         let (id, title) = (dataset.id.clone(), dataset.title.clone());
-        Ok(LoadedDataset { id, title, subjects, avatars: avatars.collect() })
+        let splits_given = dataset.subject_ids()?.into_iter().filter(|id| dataset.has_split(id)).collect();
+        Ok(LoadedDataset { id, title, subjects, avatars: avatars.collect(), splits_given, unreadable })
     }
 
     /// Loads what the experiments can use: their own datasets, and those that may stand in.
     pub(super) fn library(&self, experiments: &[Experiment]) -> Result<Library> {
         let own = |id: &str| experiments.iter().any(|experiment| experiment.dataset == id);
         let stands_in = experiments.iter().any(|experiment| experiment.stand_in.is_some());
-        // One that is there and that nothing reads is an error where a table asks for it, and no stand-in.
-        let named = |d: &Dataset| own(&d.id) && (d.is_available() || d.is_present());
+        let named = |d: &Dataset| own(&d.id) && d.is_begun();
         let wanted = |d: &&Dataset| named(d) || (stands_in && d.stand_in && d.is_available());
         let registry = self.registry()?;
         let loaded = registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset, experiments));
-        Ok(Library::new(loaded.collect::<Result<_>>()?))
+        let loaded: Vec<LoadedDataset> = loaded.collect::<Result<_>>()?;
+        let mut broken = loaded.iter().flat_map(|dataset| &dataset.unreadable);
+        if loaded.iter().all(|dataset| dataset.subjects.is_empty())
+            && let Some(Unreadable { problem, .. }) = broken.next()
+        {
+            bail!("{problem}");
+        }
+        let mut library = Library::new(loaded);
+        for variant in experiments.iter().flat_map(|experiment| &experiment.variants) {
+            if let AvatarRecipe::Renders { path } = &variant.avatar {
+                library.look_for_renders(path);
+            }
+        }
+        Ok(library)
     }
 }
 

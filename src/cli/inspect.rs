@@ -9,15 +9,17 @@ use crate::run::store;
 use anyhow::{Context as _, Result, anyhow, bail};
 use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, Binding, Body, Image, Mask};
-use skinsplat_data::avatar::{LoadedAvatar, read_avatar};
+use skinsplat_data::arrays::Arrays;
+use skinsplat_data::avatar::{Canonical, LoadedAvatar, read_avatar};
 use skinsplat_data::folder::{self, Options};
-use skinsplat_data::npz::Archive;
+use skinsplat_data::poses::PoseTrack;
 use skinsplat_data::{Subject, body, camera, frames, poses, splatting_avatar};
 use std::path::{Path, PathBuf};
 
 /// Show what a file or folder holds, and what is wrong with it.
 ///
-/// Reads avatars (.ply), bodies (.npz, .glb, .gltf), poses and cameras (.npz, .json), images, a subject's folder, a
+/// Reads avatars (.ply, .npz, .pth, .ckpt, exports of SplattingAvatar), bodies (.npz, .pkl, .glb, .gltf), poses and cameras
+/// (.npz, .pkl, .json), images, a subject's folder, a
 /// folder of subjects, results.json and the results store of a run.
 #[derive(Debug, clap::Args)]
 pub(super) struct Inspect {
@@ -29,23 +31,26 @@ pub(super) struct Inspect {
 }
 
 impl Inspect {
-    pub(super) fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self, context: super::Context) -> Result<Exit> {
         let path = &self.file;
         if self.motion.asked() {
-            self.motion.print(path)?;
+            self.motion.print(path, context)?;
             return Ok(Exit::Success);
         }
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         let text = match extension.as_str() {
             _ if path.is_dir() => folder_text(path)?,
-            "ply" => avatar_text(&read_avatar(path)?),
-            "glb" | "gltf" => body_text(&body::load(path)?) + &clips_text(path)?,
-            "npz" => archive_text(path)?,
+            "ply" | "pth" | "pt" | "ckpt" | "spz" | "splat" | "ksplat" | "sog" => {
+                avatar_text(&read_avatar(path)?)
+            }
+            "glb" | "gltf" => body_text(&body::read(path)?) + &clips_text(path)?,
+            "npz" | "pkl" | "pickle" => arrays_text(path)?,
             "json" => json_text(path)?,
             "jsonl" => store_text(path)?,
             "png" | "jpg" | "jpeg" | "npy" => image_text(&frames::load_image(path)?),
             _ => {
-                let expected = ".ply, .npz, .glb, .gltf, .json, .jsonl, .png, .jpg, .npy or a folder";
+                let expected =
+                    ".ply, .pth, .ckpt, .npz, .pkl, .glb, .gltf, .json, .jsonl, .png, .jpg, .npy or a folder";
                 bail!("{}: unknown kind of file; expected {expected}", path.display())
             }
         };
@@ -89,8 +94,29 @@ fn avatar_text(loaded: &LoadedAvatar) -> String {
         spread(gaussians.log_scales.iter().flat_map(|s| s.map(portable::exp).to_array())),
     );
     text += &line("opacity", spread(gaussians.opacities()));
+    match &loaded.canonical {
+        Canonical::Rest => {}
+        Canonical::Mesh(mesh) => {
+            text += &line("canonical", format!("a mesh of {} vertices", mesh.vertices.len()))
+        }
+        Canonical::Pose(pose) => {
+            text += &line("canonical", format!("a pose of {} joints", pose.axis_angles.len()))
+        }
+        Canonical::Faces => {
+            text += &line("canonical", "the frame of each Gaussian's face, lengths in units of its size")
+        }
+    }
+    if let Some(texture) = &loaded.texture {
+        text += &line("texture", format!("{}x{}, on the body's mesh", texture.width(), texture.height()));
+    }
+    if let Some(betas) = &loaded.betas {
+        text += &line("betas", format!("{betas:?}"));
+    }
     if let Some(body) = &loaded.body {
         text += &line("body", body);
+    }
+    if !loaded.ignored.is_empty() {
+        text += &line("not read", listed(&loaded.ignored));
     }
     let comments = loaded.comments.iter().map(|comment| line("comment", comment));
     let notes = loaded.notes.iter().map(|note| line("note", note));
@@ -98,13 +124,22 @@ fn avatar_text(loaded: &LoadedAvatar) -> String {
     text + &comments.chain(notes).chain(beside).collect::<String>()
 }
 
-fn body_text(model: &Body) -> String {
-    let rest = &model.rest;
+/// Names, the first of many.
+fn listed(names: &[String]) -> String {
+    const MOST: usize = 24;
+    let shown: Vec<String> = names.iter().take(MOST).map(|name| name.escape_debug().to_string()).collect();
+    let more = if names.len() > MOST { format!(" and {} more", names.len() - MOST) } else { String::new() };
+    shown.join(" ") + &more
+}
+
+fn body_text(loaded: &body::Loaded) -> String {
+    let body::Loaded { body: Body { rest, shape }, notes } = loaded;
     let mut text = line("kind", "body model") + &line("vertices", rest.vertices.len());
     text += &line("faces", rest.faces.len());
     text += &line("joints", rest.skeleton.num_joints());
     text += &line("influences", format!("up to {} per vertex", rest.weights.max_influences()));
-    text += &line("shape directions", model.shape.as_ref().map_or(0, |shape| shape.directions.len()));
+    text += &line("shape directions", shape.as_ref().map_or(0, |shape| shape.directions.len()));
+    text += &line("expressions", shape.as_ref().map_or(0, |shape| shape.expressions.len()));
     text += &line("pose directions", rest.pose_directions.len());
     text += &line("texture coordinates", if rest.uv.is_some() { "yes" } else { "no" });
     let flat = |f: &&[u32; 3]| {
@@ -112,7 +147,12 @@ fn body_text(model: &Body) -> String {
         (b - a).cross(c - a).length() < 1e-14
     };
     text += &line("zero-area faces", rest.faces.iter().filter(flat).count());
-    text + &line("joint names", rest.skeleton.names.join(" "))
+    text += &line("joint names", rest.skeleton.names.join(" "));
+    text + &notes_text(notes)
+}
+
+fn notes_text(notes: &[String]) -> String {
+    notes.iter().map(|note| line("note", note)).collect()
 }
 
 fn clips_text(path: &Path) -> Result<String> {
@@ -122,46 +162,58 @@ fn clips_text(path: &Path) -> Result<String> {
     Ok(skinsplat_data::gltf::Rig::load(path)?.clips.iter().map(clip).collect())
 }
 
-fn archive_text(path: &Path) -> Result<String> {
-    let mut archive = Archive::open(path, "archive")?;
-    let mut text = line("kind", "npz archive");
-    for name in archive.names() {
-        let header = archive.header(&name)?;
-        text += &line(&name, format!("{:?} {}", header.shape, header.descr));
+/// An `.npz` archive or a pickle: its arrays, and what they are together.
+fn arrays_text(path: &Path) -> Result<String> {
+    let mut arrays = Arrays::open(path, "archive")?;
+    let mut text = line("kind", arrays.kind());
+    for name in arrays.names() {
+        text += &line(&name.escape_debug().to_string(), arrays.describe(&name)?);
     }
-    let has = |name: &str| archive.contains(name);
+    let has = |name: &str| arrays.contains(name);
+    if has("means") && has("quats") {
+        return Ok(text + &avatar_text(&read_avatar(path)?));
+    }
     if has("v_template") {
-        return Ok(text + &body_text(&body::load(path)?));
-    }
-    if has("thetas") || has("global_orient") {
-        let track = poses::load(path)?;
-        return Ok(text + &line("poses", track.len()) + &line("betas", format!("{:?}", track.betas)));
+        return Ok(text + &body_text(&body::read(path)?));
     }
     if has("intrinsic") || has("K") {
         return Ok(text + &cameras_text(path)?);
     }
+    if poses::is_motion(&arrays) {
+        return Ok(text + &motion_text(&poses::load(path)?));
+    }
     Ok(text)
 }
 
+fn motion_text(track: &PoseTrack) -> String {
+    let mut text = line("poses", track.len()) + &line("joints", track.num_joints());
+    text += &line("betas", format!("{:?}", track.betas));
+    text += &track.gender.iter().map(|gender| line("gender", gender.escape_debug())).collect::<String>();
+    text += &track.framerate.iter().map(|rate| line("poses per second", rate)).collect::<String>();
+    text + &notes_text(track.notes())
+}
+
 fn cameras_text(path: &Path) -> Result<String> {
-    let cameras = camera::load(path)?;
-    let describe = |(i, c): (usize, &skinsplat_core::scene::Camera)| {
+    let views = camera::load_views(path)?;
+    let describe = |(i, view): (usize, &camera::CameraView)| {
+        let c = &view.camera;
         let centre = format!("centre ({:.1}, {:.1})", c.cx, c.cy);
         line(
             &format!("camera {i}"),
             format!("{}x{}, focal {:.1} {:.1}, {centre}", c.width, c.height, c.fx, c.fy),
         )
     };
-    Ok(cameras.iter().enumerate().map(describe).collect())
+    let note = views.iter().find_map(|view| view.note.as_ref()).map(|note| line("note", note));
+    Ok(views.iter().enumerate().map(describe).chain(note).collect())
 }
 
 fn json_text(path: &Path) -> Result<String> {
     let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot read", path.display()))?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let value: serde_json::Value =
-        serde_json::from_str(&text).with_context(|| format!("{}: not JSON", path.display()))?;
+        serde_json::from_str(text).with_context(|| format!("{}: not JSON", path.display()))?;
     if value.get("schema").is_some() && value.get("tables").is_some() {
-        let results =
-            Results::from_json(&text).map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
+        let results = Results::from_json(text).map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
         let mut text = line("kind", "results of a run") + &line("plan", &results.plan);
         for table in &results.tables {
             let protocol = format!("{}@{}", table.protocol.id, table.protocol.version);
@@ -202,7 +254,7 @@ fn image_text((image, alpha): &(Image, Option<Mask>)) -> String {
 }
 
 fn folder_text(path: &Path) -> Result<String> {
-    if splatting_avatar::is_export(&path.join(splatting_avatar::GAUSSIANS)) {
+    if path.join(splatting_avatar::GAUSSIANS).is_file() || path.join("point_cloud").is_dir() {
         return Ok(avatar_text(&read_avatar(path)?));
     }
     if folder::is_subject(path) {

@@ -9,6 +9,7 @@ use skinsplat_fit::RECIPES;
 use skinsplat_metrics::{METRICS, Metric, PROTOCOLS, SsimVariant, VARIANT_IDS};
 use skinsplat_posing::PRESETS;
 use skinsplat_table::{Cell, Column, Label, Row, Table, text};
+use std::path::{Path, PathBuf};
 
 /// List experiments, datasets, strategies, recipes, protocols or metrics.
 #[derive(Debug, clap::Args)]
@@ -64,10 +65,10 @@ impl List {
             (false, _) if d.reader().is_none() => {
                 format!("not available: nothing reads the layout {} yet", d.layout)
             }
-            (false, Some(path)) => {
-                let looked = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-                format!("not available: looked in {}", looked.display())
+            (false, Some(_)) if d.is_begun() => {
+                format!("not complete: no folder {}", names(&d.missing_folders()))
             }
+            (false, Some(path)) => format!("not available: looked in {}", absolute(path).display()),
             (false, None) => "not available".to_owned(),
         };
         let registry = self.data.registry()?;
@@ -79,6 +80,15 @@ impl List {
             rows,
         ))
     }
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
+fn names(folders: &[PathBuf]) -> String {
+    let names: Vec<String> = folders.iter().map(|folder| absolute(folder).display().to_string()).collect();
+    names.join(", ")
 }
 
 /// A table of things by id, and texts about them.

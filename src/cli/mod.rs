@@ -1,9 +1,11 @@
 //! The command line: one file per subcommand, progress, exit codes.
 
 mod blend;
+mod check;
 mod completions;
 mod data;
 mod exit;
+mod fetch_help;
 mod fit;
 mod inspect;
 mod list;
@@ -53,6 +55,8 @@ enum Command {
     Plan(plan::Plan),
     Report(report::Report),
     List(list::List),
+    Check(check::Check),
+    FetchHelp(fetch_help::FetchHelp),
     Fit(fit::Fit),
     Render(render::Render),
     Skin(skin::Skin),
@@ -119,9 +123,11 @@ fn report_error(text: &str) {
     eprintln!("error: {text}");
 }
 
-/// One line, whatever the messages of the libraries below look like.
+/// One line, whatever the messages of the libraries below look like and whatever names are in them: a terminal obeys no
+/// file.
 fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    words.replace(char::is_control, "\u{fffd}")
 }
 
 impl Command {
@@ -131,6 +137,8 @@ impl Command {
             Self::Plan(command) => command.run(),
             Self::Report(command) => command.run(context),
             Self::List(command) => command.run(),
+            Self::Check(command) => command.run(context),
+            Self::FetchHelp(command) => command.run(),
             Self::Fit(command) => command.run(context),
             Self::Render(command) => command.run(context),
             Self::Skin(command) => command.run(context),
@@ -138,14 +146,15 @@ impl Command {
             Self::Blend(command) => command.run(),
             Self::Trade(command) => command.run(context),
             Self::Stress(command) => command.run(context),
-            Self::Inspect(command) => command.run(),
+            Self::Inspect(command) => command.run(context),
             Self::Completions(command) => command.run(),
         }
     }
 }
 
 fn set_threads(threads: Option<u16>) -> anyhow::Result<()> {
-    let allotted = || std::env::var("SLURM_CPUS_PER_TASK").ok()?.parse().ok();
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let allotted = || Some(std::env::var("SLURM_CPUS_PER_TASK").ok()?.parse::<usize>().ok()?.min(cores));
     let threads = threads.map(usize::from).or_else(allotted).unwrap_or(0);
     Ok(rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?)
 }

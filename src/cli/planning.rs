@@ -32,6 +32,10 @@ pub(super) struct Planning {
     /// Take a variant's avatar from FILE, in which {subject} stands for the id of each subject (may be repeated)
     #[arg(long = "avatar", value_name = "VARIANT=FILE", value_parser = given_avatar)]
     avatars: Vec<GivenAvatar>,
+    /// Take a variant's frames from FOLDER, rendered by any program and named as the test frames; {subject} and {sequence}
+    /// stand for their ids (may be repeated)
+    #[arg(long, value_name = "VARIANT=FOLDER", value_parser = given_avatar)]
+    renders: Vec<GivenAvatar>,
     /// Only test frames START <= index < END of each sequence
     #[arg(long, value_name = "START..END", value_parser = range, help_heading = "Subset")]
     frames: Option<Range>,
@@ -50,7 +54,7 @@ pub(super) struct Planning {
     data: Data,
 }
 
-/// A file that replaces the avatar of a variant.
+/// A file or folder that replaces the avatar of a variant.
 #[derive(Clone, Debug)]
 struct GivenAvatar {
     variant: String,
@@ -86,22 +90,17 @@ impl Planning {
         let given = |(net, digest): (_, &str)| GivenWeights { net, digest: digest.to_owned() };
         let lpips_weights = networks.given().map(given);
         let options = Options { profile: self.profile(), subset, lpips_weights };
-        let plan = experiment::plan(&experiments, &library.describe()?, &options)?;
+        let described = library.describe()?;
+        renders_were_found(&described)?;
+        let plan = experiment::plan(&experiments, &described, &options)?;
         Ok(Planned { plan, experiments, library, networks })
     }
 
-    /// The experiments with the avatars that the arguments name.
+    /// The experiments with the avatars and renders that the arguments name.
     fn with_given_avatars(&self, mut experiments: Vec<Experiment>) -> Result<Vec<Experiment>> {
         for GivenAvatar { variant: id, file } in &self.avatars {
-            let all = experiments.iter_mut().flat_map(|experiment| &mut experiment.variants);
-            let (named, others): (Vec<&mut Variant>, Vec<_>) = all.partition(|variant| variant.id == *id);
             let argument = format!("--avatar {id}={}", file.display());
-            if named.is_empty() {
-                let known: BTreeSet<&str> = others.iter().map(|variant| variant.id.as_str()).collect();
-                let known: Vec<&str> = known.into_iter().collect();
-                bail!("{argument}: no variant `{id}`; expected one of {}", known.join(", "));
-            }
-            for variant in named {
+            for variant in named(&mut experiments, id, &argument)? {
                 if variant.strategy.is_none() {
                     bail!(
                         "{argument}: a textured mesh without a strategy; expected a variant that poses Gaussians"
@@ -109,6 +108,13 @@ impl Planning {
                 }
                 variant.avatar = AvatarRecipe::File { name: given_name(id), otherwise: None };
                 variant.sh_degree = None;
+            }
+        }
+        for GivenAvatar { variant: id, file } in &self.renders {
+            let argument = format!("--renders {id}={}", file.display());
+            for variant in named(&mut experiments, id, &argument)? {
+                variant.avatar = AvatarRecipe::Renders { path: file.clone() };
+                (variant.sh_degree, variant.strategy) = (None, None);
             }
         }
         Ok(experiments)
@@ -139,6 +145,36 @@ impl Planning {
             if extend { chosen.iter().map(Experiment::with_all_strategies).collect() } else { chosen };
         Ok(chosen.into_iter().map(|e| e.with_seeds(&self.seeds)).collect::<Result<_, _>>()?)
     }
+}
+
+/// A folder in which no frame of any sequence was found is a mistake; gaps are named by the tables.
+fn renders_were_found(datasets: &[experiment::Dataset]) -> Result<()> {
+    let all = || datasets.iter().flat_map(|d| &d.subjects).flat_map(|subject| &subject.renders);
+    for renders in all() {
+        if all().filter(|own| own.path == renders.path).all(|own| own.frames.is_empty()) {
+            let expected = "images named as the test frames, such as image_0001.png";
+            bail!("{}: no render of {}; expected {expected}", renders.folder.display(), renders.sequence);
+        }
+        let shared =
+            |own: &&experiment::RenderedFrames| own.folder == renders.folder && !own.frames.is_empty();
+        if !renders.frames.is_empty() && all().filter(shared).count() > 1 {
+            let expected = "{subject} or {sequence} in the path, so that each has its own";
+            bail!("{}: the renders of several sequences; expected {expected}", renders.folder.display());
+        }
+    }
+    Ok(())
+}
+
+/// The variants of an id, which an argument names.
+fn named<'e>(experiments: &'e mut [Experiment], id: &str, argument: &str) -> Result<Vec<&'e mut Variant>> {
+    let all = experiments.iter_mut().flat_map(|experiment| &mut experiment.variants);
+    let (named, others): (Vec<&mut Variant>, Vec<_>) = all.partition(|variant| variant.id == id);
+    if named.is_empty() {
+        let known: BTreeSet<&str> = others.iter().map(|variant| variant.id.as_str()).collect();
+        let known: Vec<&str> = known.into_iter().collect();
+        bail!("{argument}: no variant `{id}`; expected one of {}", known.join(", "));
+    }
+    Ok(named)
 }
 
 /// The experiments of `experiments/` in this folder, if there is one; else those that are built in.

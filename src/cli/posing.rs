@@ -1,13 +1,12 @@
 //! An avatar, a body, a frame of a pose track and a strategy: the arguments of `render` and `skin`.
 
 use crate::run::drawable::{Drawable, Look, PosedView, Scratch};
-use crate::run::foreign::on_body;
-use crate::run::textured::TexturedFiles;
+use crate::run::foreign::{OnBody, on_body};
 use anyhow::{Context as _, Result, bail};
 use skinsplat_core::scene::{
     Avatar, Binding, Body, Camera, Image, OwnedPosed, Pose, Posed, PosedBody, RestBody,
 };
-use skinsplat_data::avatar::read_avatar;
+use skinsplat_data::avatar::{Canonical, LoadedAvatar, read_avatar};
 use skinsplat_data::{body, poses};
 use skinsplat_fit::texture::TexturedBody;
 use skinsplat_posing::{BoundAvatar, JointLift, PoseOptions, Poser, Strategy};
@@ -19,10 +18,10 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Posing")]
 pub(super) struct Posing {
-    /// Body model: SMPL-style .npz, or skinned .glb or .gltf
+    /// Body model: SMPL-style .npz or .pkl, or skinned .glb or .gltf
     #[arg(long, value_name = "BODY")]
     body: Option<PathBuf>,
-    /// Poses: .npz, transforms.json, or a .glb or .gltf with clips
+    /// Poses: .npz or .pkl (smplx, AMASS, AIST++), transforms.json, or a .glb or .gltf with clips
     #[arg(long, value_name = "POSES", requires = "body")]
     poses: Option<PathBuf>,
     /// Clip of a glTF file with several
@@ -44,7 +43,7 @@ pub(super) struct Subject {
     rest: Option<(RestBody, Pose)>,
     /// The poses of the track before this one.
     before: Vec<Pose>,
-    /// What has to be said of the avatar.
+    /// What has to be said of the files, each with its name.
     notes: Vec<String>,
 }
 
@@ -61,43 +60,93 @@ impl Posing {
 
     /// Loads the avatar and, if a body was named, the body in its shape and the pose of the frame.
     pub(super) fn load(&self, avatar: &Path) -> Result<Subject> {
-        let mut loaded = read_avatar(avatar)?;
-        let Some(body_path) = &self.body else {
-            loaded.avatar.binding = Binding::Static;
-            let (avatar, notes) = (loaded.avatar, Vec::new());
-            return Ok(Subject { avatar, mesh: None, rest: None, before: Vec::new(), notes });
-        };
-        if !loaded.is_bound() {
-            let expected = "joint and weight properties, or face, barycentric and offset properties";
-            bail!("{}: no binding; expected {expected}, to pose it with --body", avatar.display());
+        let loaded = read_avatar(avatar)?;
+        let Some(body_path) = &self.body else { return as_it_stands(loaded) };
+        let model = body::read(body_path)?;
+        let mut remarks = said(body_path, model.notes);
+        let betas = loaded.betas.clone();
+        if betas.is_some() {
+            let note = "the body has the shape (betas) that this file holds".to_owned();
+            remarks.extend(said(avatar, vec![note]));
         }
-        let model = body::load(body_path)?;
-        let (rest, pose, before) = match &self.poses {
+        let Motion { rest, pose, before } = match &self.poses {
             None => {
-                let rest = model.shaped(&[])?;
-                let pose = Pose::rest(&rest.skeleton);
-                (rest, pose, Vec::new())
+                let (rest, notes) = body::shape(&model.body, betas.as_deref().unwrap_or(&[]), &[])?;
+                remarks.extend(said(body_path, notes));
+                Motion { pose: Pose::rest(&rest.skeleton), rest, before: Vec::new() }
             }
-            Some(path) => self.poses_to_frame(path, &model)?,
+            Some(path) => {
+                let (motion, notes) = self.poses_to_frame(path, &model.body, betas.as_deref())?;
+                remarks.extend(said(path, notes));
+                motion
+            }
         };
-        let mesh = TexturedFiles::beside(&loaded.files[0]);
-        let mesh = mesh.exist().then(|| mesh.read(&rest)).transpose()?;
-        let (avatar, notes) = on_body(loaded, &rest)?;
-        Ok(Subject { avatar, mesh, rest: Some((rest, pose)), before, notes })
+        let joints = PosedBody::new(&rest, &pose)?;
+        remarks.extend(
+            scale_note(&joints, self.strategy).map(|note| format!("{}: {note}", body_path.display())),
+        );
+        let OnBody { avatar: bound, body, mesh, notes } = on_body(loaded, &rest)?;
+        let notes = said(avatar, notes).into_iter().chain(remarks).collect();
+        Ok(Subject { avatar: bound, mesh, rest: Some((body.unwrap_or(rest), pose)), before, notes })
     }
 
-    /// The body in its shape, the pose of the frame and those before it.
-    fn poses_to_frame(&self, path: &Path, model: &Body) -> Result<(RestBody, Pose, Vec<Pose>)> {
+    /// The body in its shape (that of the avatar, if it has one), the pose of the frame and those before it; and what has to
+    /// be said of them.
+    fn poses_to_frame(
+        &self,
+        path: &Path,
+        model: &Body,
+        betas: Option<&[f64]>,
+    ) -> Result<(Motion, Vec<String>)> {
         let track = poses::load_clip(path, self.clip.as_deref())?;
-        let rest = model.shaped(&track.betas).with_context(|| format!("{}", path.display()))?;
+        let shaped = body::shape(model, betas.unwrap_or(&track.betas), &track.expression);
+        let (rest, mut notes) = shaped.with_context(|| format!("{}", path.display()))?;
+        notes.extend(track.notes_for(&rest.skeleton));
         let mut poses = track.poses(&rest.skeleton)?.to_vec();
         if self.frame >= poses.len() {
             bail!("{}: --frame {}; expected a frame below {}", path.display(), self.frame, poses.len());
         }
         poses.truncate(self.frame + 1);
         let pose = poses.remove(self.frame);
-        Ok((rest, pose, poses))
+        Ok((Motion { rest, pose, before: poses }, notes))
     }
+}
+
+/// An avatar without a body: its Gaussians where the file has them.
+fn as_it_stands(loaded: LoadedAvatar) -> Result<Subject> {
+    let LoadedAvatar { mut avatar, canonical, files, mut notes, texture, .. } = loaded;
+    if canonical == Canonical::Faces {
+        let expected = "--body: Gaussians are measured on the faces of a body";
+        bail!("{}: no place without a body; expected {expected}", files[0].display());
+    }
+    if texture.is_some() {
+        notes.push("its textured mesh is not drawn: that needs --body".to_owned());
+    }
+    avatar.binding = Binding::Static;
+    let notes = said(&files[0], notes);
+    Ok(Subject { avatar, mesh: None, rest: None, before: Vec::new(), notes })
+}
+
+/// Notes with the file that they are about.
+fn said(path: &Path, notes: Vec<String>) -> Vec<String> {
+    notes.into_iter().map(|note| format!("{}: {note}", path.display())).collect()
+}
+
+/// A body in its shape, a pose of it and those before.
+struct Motion {
+    rest: RestBody,
+    pose: Pose,
+    before: Vec<Pose>,
+}
+
+/// What a strategy leaves out of joints that scale, if it does.
+fn scale_note(body: &PosedBody<'_>, strategy: Strategy) -> Option<String> {
+    let joint = strategy.ignored_scale(body)?;
+    let name = &body.rest.skeleton.names[joint];
+    Some(format!(
+        "joint {name} scales by unequal factors, which the shape of Gaussians does not follow \
+         (covariance=affine does)"
+    ))
 }
 
 impl Subject {
@@ -106,19 +155,25 @@ impl Subject {
         &self.avatar
     }
 
-    /// What has to be said of the avatar, a clause each.
+    /// What has to be said of avatar, body and poses, a line each.
     pub(super) fn notes(&self) -> &[String] {
         &self.notes
     }
 
     /// Draws the avatar in its pose, with its mesh if it has one; without a body as it stands.
-    pub(super) fn image(&self, camera: &Camera, look: &Look) -> Result<Image> {
+    pub(super) fn image(&self, camera: &Camera, look: &Look<'_>) -> Result<Image> {
         let Some((rest, pose)) = &self.rest else {
             let posed = OwnedPosed::from_static(&self.avatar.gaussians);
             return Ok(splat::render(&posed.as_posed(), &look.at(camera))?.image);
         };
         let drawable = Drawable::new(&self.avatar, self.mesh.as_ref().map(Cow::Borrowed), rest)?;
-        let view = PosedView { pose, camera, body: PosedBody::new(rest, pose)? };
+        let view = PosedView {
+            pose,
+            camera,
+            body: PosedBody::new(rest, pose)?,
+            name: "",
+            stored: [camera.width, camera.height],
+        };
         Ok(drawable.draw(&view, look, &mut Scratch::default())?.image)
     }
 

@@ -2,19 +2,20 @@
 
 use super::posing::Posing;
 use super::{Context, Exit, selection::parse_colour};
-use crate::run::drawable::Look;
+use crate::run::drawable::{Behind, Look};
 use anyhow::{Result, bail};
 use skinsplat_data::{camera, frames};
 use std::path::PathBuf;
 
-/// Render a 3DGS PLY, posed or as it stands.
+/// Render an avatar, posed or as it stands.
 ///
 /// Semantics are those of the original 3DGS rasterizer. CAMERA.json holds width, height, fx, fy, cx, cy,
-/// world_to_camera (4x4, rows, OpenCV axes) and, if you like, background; cameras.npz is read as well.
+/// world_to_camera (4x4, rows, OpenCV axes) and, if you like, background; cameras.npz, cameras.json of 3DGS training and
+/// transforms.json of nerfstudio are read as well.
 #[derive(Debug, clap::Args)]
 pub(super) struct Render {
-    /// The avatar or scene
-    #[arg(value_name = "FILE.ply")]
+    /// The avatar or scene, whoever made it
+    #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Camera: .json or .npz
     #[arg(long, value_name = "CAMERA")]
@@ -46,7 +47,7 @@ impl Render {
         if !["png", "npy"].contains(&extension.as_str()) {
             bail!("{}: --out; expected a name that ends in .png or .npy", self.out.display());
         }
-        let background = self.background.or(view.background).unwrap_or([0.0; 3]);
+        let background = Behind::Colour(self.background.or(view.background).unwrap_or([0.0; 3]));
         let look = Look { strategy: Some(self.posing.strategy()), background, antialiased: self.antialiased };
         let subject = self.posing.load(&self.file)?;
         let image = subject.image(&view.camera, &look)?;
@@ -54,7 +55,8 @@ impl Render {
             "png" => frames::save_png(&self.out, &image)?,
             _ => frames::save_npy(&self.out, &image)?,
         }
-        subject.notes().iter().for_each(|note| context.note(format!("{}: {note}", self.file.display())));
+        view.note.iter().for_each(|note| context.note(format!("{}: {note}", self.camera.display())));
+        subject.notes().iter().for_each(|note| context.note(note));
         let (n, out) = (subject.avatar().gaussians.len(), self.out.display());
         context.note(format!("{out}: {n} Gaussians, {}x{}", view.camera.width, view.camera.height));
         Ok(Exit::Success)

@@ -3,7 +3,7 @@
 use super::output::emit;
 use super::planning::{Planned, Planning};
 use super::{Context, Exit, progress::Watch};
-use crate::experiment::{Records, Shard};
+use crate::experiment::{Records, Shard, Unreadable};
 use crate::report;
 use crate::run::gallery;
 use crate::run::provenance::Provenance;
@@ -117,6 +117,13 @@ impl Run {
         let missing = results.missing();
         if missing > 0 {
             context.note(format!("{missing} scores are missing; {out}/{FILE_NAME} says why"));
+            return Ok(Exit::Incomplete);
+        }
+        let mut unreadable = planned.library.unreadable().peekable();
+        if unreadable.peek().is_some() {
+            for (dataset, Unreadable { subject, problem }) in unreadable {
+                context.note(format!("{dataset}/{subject}: left out: {problem}"));
+            }
             return Ok(Exit::Incomplete);
         }
         if planned.plan.jobs.is_empty() {

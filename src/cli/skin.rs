@@ -13,8 +13,8 @@ use std::path::PathBuf;
 /// Quaternions and SH are rotated, so any rasterizer draws the posed avatar: none needs to change.
 #[derive(Debug, clap::Args)]
 pub(super) struct Skin {
-    /// The canonical avatar
-    #[arg(value_name = "AVATAR.ply")]
+    /// The canonical avatar, whoever made it
+    #[arg(value_name = "AVATAR")]
     avatar: PathBuf,
     /// The posed Gaussians to write
     #[arg(long, value_name = "POSED.ply")]
@@ -52,7 +52,7 @@ impl Skin {
         let avatar = Avatar { gaussians: baked.gaussians, binding: Binding::Static };
         let metadata = ply::Metadata { body: None, comments: vec![format!("posed by {strategy}")] };
         ply::write_avatar(&self.out, &avatar, &metadata, ply::Encoding::LittleEndian)?;
-        subject.notes().iter().for_each(|note| context.note(format!("{}: {note}", self.avatar.display())));
+        subject.notes().iter().for_each(|note| context.note(note));
         if let Some(loss) = baked.loss {
             context.note(format!("{}: {loss}", self.out.display()));
         }

@@ -4,13 +4,17 @@ use super::data::Data;
 use super::output::emit;
 use super::progress::Watch;
 use super::{Context, Exit};
+use crate::run::foreign::{OnBody, on_body};
 use anyhow::{Context as _, Result, bail};
-use skinsplat_data::{Subject, atomic, ply};
+use skinsplat_core::scene::Avatar;
+use skinsplat_data::avatar::read_avatar;
+use skinsplat_data::{Subject, atomic};
 use skinsplat_fit::recipe::Placement;
 use skinsplat_plot::{png, svg};
 use skinsplat_study::trade::{self, Options, SWEEPS, Stage, Sweep, Trade, savings};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The subject that is measured unless another is named.
 const DEFAULT_SUBJECT: &str = "synthetic/ring_stripes";
@@ -29,8 +33,8 @@ pub(super) struct Trading {
     /// [default: a built-in subject, or the first of --data]
     #[arg(value_name = "DATASET/SUBJECT")]
     subject: Option<String>,
-    /// The avatar to measure, bound to the subject's body [default: made from the training frames]
-    #[arg(long, value_name = "AVATAR.ply")]
+    /// The avatar to measure on the subject's body, whoever made it [default: made from the training frames]
+    #[arg(long, value_name = "AVATAR")]
     avatar: Option<PathBuf>,
     /// How the avatar is made if none is given
     #[arg(long, value_enum, default_value_t, conflicts_with = "avatar")]
@@ -74,7 +78,13 @@ fn table(id: &str) -> Result<&'static str, String> {
 impl Trading {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let (name, subject) = self.subject()?;
-        let given = self.avatar.as_deref().map(ply::read_avatar).transpose()?;
+        let (subject, given) = match &self.avatar {
+            Some(path) => {
+                let (subject, avatar) = self.given(path, subject, context)?;
+                (subject, Some(avatar))
+            }
+            None => (subject, None),
+        };
         let watch = Watch::new(context.quiet);
         watch.start("avatar", 1);
         let stage = Stage::new(&name, &subject, given, &self.options());
@@ -101,6 +111,23 @@ impl Trading {
             emit(&page)?;
         }
         Ok(Exit::Success)
+    }
+
+    /// The avatar of a file on the subject's body, and the subject with the body that it hangs on.
+    fn given(&self, path: &Path, mut subject: Subject, context: Context) -> Result<(Subject, Avatar)> {
+        let Some(body) = subject.sequences().next().map(|sequence| Arc::clone(&sequence.body)) else {
+            bail!("{}: no sequence; expected one with a body for {}", subject.id, path.display());
+        };
+        let OnBody { avatar, body, mesh, mut notes } = on_body(read_avatar(path)?, &body)?;
+        if let Some(body) = body.map(Arc::new) {
+            let sequences = subject.train.iter_mut().chain(&mut subject.test);
+            sequences.for_each(|sequence| sequence.body = Arc::clone(&body));
+        }
+        if mesh.is_some() {
+            notes.push("its mesh is left out: only Gaussians are measured".to_owned());
+        }
+        notes.iter().for_each(|note| context.note(format!("{}: {note}", path.display())));
+        Ok((subject, avatar))
     }
 
     fn options(&self) -> Options {

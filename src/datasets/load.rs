@@ -46,7 +46,13 @@ impl Dataset {
             let parameters = self.generators()?.remove(id).ok_or_else(absent)?;
             let made = synthetic::Subject::new(&parameters).map_err(|e| self.invalid_parameters(e))?;
             let (train, test) = (made.train(), made.test());
-            return Ok(Subject { id: id.to_owned(), capture: parameters.capture, train, test });
+            return Ok(Subject {
+                id: id.to_owned(),
+                capture: parameters.capture,
+                train,
+                test,
+                notes: Vec::new(),
+            });
         }
         let folder = self.subject_folders().and_then(|folders| folders.into_iter().nth(place));
         Ok(Subject { id: id.to_owned(), ..self.load_subject(&folder.ok_or_else(absent)?, options)? })

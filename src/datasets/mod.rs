@@ -34,6 +34,9 @@ pub struct Dataset {
     pub licence: String,
     /// Who made it, and how.
     pub provenance: String,
+    /// Where it is to be had.
+    #[serde(default)]
+    pub url: Option<String>,
     /// A subject, or a folder that holds the subjects. After loading relative to the current folder, or absolute.
     #[serde(default)]
     pub path: Option<PathBuf>,
@@ -79,9 +82,6 @@ fn yes() -> bool {
 
 /// The layout of data sets that are generated in-process.
 const GENERATED: &str = "synthetic";
-
-/// Layouts of data sets that the paper names and that nothing reads yet.
-const UNREAD: [&str; 3] = ["neuman", "galabasketball", "xhumans"];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -191,7 +191,7 @@ impl Dataset {
         self.layout == GENERATED
     }
 
-    /// What reads its subjects; none if they are generated, or if nothing reads its layout yet.
+    /// What reads its subjects; none if they are generated.
     pub fn reader(&self) -> Option<&'static Layout> {
         Layout::named(&self.layout)
     }
@@ -205,6 +205,23 @@ impl Dataset {
     /// True if the folder of every subject exists, whether or not anything reads it.
     pub fn is_present(&self) -> bool {
         self.subject_folders().is_some_and(|folders| folders.iter().all(|folder| folder.is_dir()))
+    }
+
+    /// True if the folder of at least one subject exists and its layout is read.
+    pub fn is_begun(&self) -> bool {
+        let some =
+            || self.subject_folders().is_some_and(|folders| folders.iter().any(|folder| folder.is_dir()));
+        self.is_generated() || (self.reader().is_some() && some())
+    }
+
+    /// The folders of subjects that are not there.
+    pub fn missing_folders(&self) -> Vec<PathBuf> {
+        self.subject_folders().unwrap_or_default().into_iter().filter(|folder| !folder.is_dir()).collect()
+    }
+
+    /// True if it says which frames of a subject are for what.
+    pub fn has_split(&self, subject: &str) -> bool {
+        self.splits.contains_key(self.folders.get(subject).map_or(subject, String::as_str))
     }
 
     /// The subjects' folders; `None` without a path.
@@ -237,10 +254,10 @@ impl Dataset {
     }
 }
 
-/// A layout that somebody has heard of.
+/// A layout that something reads.
 fn known_layout<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let id = String::deserialize(deserializer)?;
-    let known = || [GENERATED].into_iter().chain(LAYOUTS.iter().map(|layout| layout.id)).chain(UNREAD);
+    let known = || [GENERATED].into_iter().chain(LAYOUTS.iter().map(|layout| layout.id));
     if known().any(|known| known == id) {
         return Ok(id);
     }
@@ -261,6 +278,7 @@ fn found(folder: &Path) -> Result<Dataset, Error> {
         capture: folder::inspect(folder)?,
         licence: "see the data".to_owned(),
         provenance: "found by scanning a folder".to_owned(),
+        url: None,
         path: Some(folder.to_owned()),
         model: None,
         stand_in: true,

@@ -1,6 +1,9 @@
 //! The avatars of a plan: where each comes from, with exactly what that needs.
 
-use super::{AvatarFile, AvatarRecipe, AvatarState, CodeVersions, DataRow, Profile, SubjectInfo, Variant};
+use super::{
+    AvatarFile, AvatarRecipe, AvatarState, CodeVersions, DataRow, Profile, RenderedFrames, SubjectInfo,
+    Variant,
+};
 use serde::Serialize;
 use serde_json::{Value, json};
 use skinsplat_data::key::content_key;
@@ -9,7 +12,7 @@ use skinsplat_fit::surface::SurfaceInit;
 use skinsplat_fit::texture::TextureInit;
 use skinsplat_fit::train::Starting;
 use skinsplat_fit::{FitOptions, Recipe};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// An avatar to be made or read before its jobs can run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -43,6 +46,8 @@ pub enum AvatarSource {
         /// The sequence whose body it is bound to.
         sequence: String,
     },
+    /// Images that another program rendered.
+    Renders(RenderedFrames),
     /// Gaussians on the body's surface, coloured from the training frames.
     Surface {
         /// The training frames.
@@ -96,7 +101,7 @@ impl PlannedAvatar {
     /// The frames that it is made from; none if it is a file.
     pub fn training(&self) -> Option<&TrainingFrames> {
         match &self.source {
-            AvatarSource::File { .. } => None,
+            AvatarSource::File { .. } | AvatarSource::Renders(_) => None,
             AvatarSource::Surface { training, .. }
             | AvatarSource::Textured { training, .. }
             | AvatarSource::Fit { training, .. } => Some(training),
@@ -107,6 +112,7 @@ impl PlannedAvatar {
     pub fn label(&self) -> String {
         let how = match &self.source {
             AvatarSource::File { name, .. } => format!("file {name}"),
+            AvatarSource::Renders(renders) => format!("renders in {}", renders.folder.display()),
             AvatarSource::Surface { placement: Placement::Vertices, .. } => "surface-vertex".to_owned(),
             AvatarSource::Surface { placement: Placement::Faces, .. } => "surface-face".to_owned(),
             AvatarSource::Textured { size, .. } => format!("textured-mesh {size}"),
@@ -122,6 +128,8 @@ pub(super) type Problem = (String, String);
 /// Plans the avatars of one row of a table.
 pub(super) struct Planner<'a> {
     pub(super) profile: &'a Profile,
+    /// Longer side of the images, pixels; native if absent.
+    pub(super) resolution: Option<u32>,
     pub(super) subject: &'a SubjectInfo,
     pub(super) row: &'a DataRow,
 }
@@ -155,7 +163,18 @@ impl Planner<'_> {
                 Ok((AvatarSource::Textured { training, size: *size }, content))
             }
             AvatarRecipe::Fit { name, seed } => self.fit(name, *seed),
+            AvatarRecipe::Renders { path } => self.renders(path),
         }
+    }
+
+    fn renders(&self, path: &Path) -> Result<(AvatarSource, Value), Problem> {
+        let of_row = |own: &&RenderedFrames| own.path == path && own.sequence == self.row.sequence;
+        let renders = self.subject.renders.iter().find(of_row).ok_or_else(|| {
+            let of = format!("{}/{}", self.row.subject, self.row.sequence);
+            (format!("renders of {of} in {}", path.display()), "renders that were looked for".to_owned())
+        })?;
+        let content = json!({ "renders": renders.digest, "splats": renders.splats });
+        Ok((AvatarSource::Renders(renders.clone()), content))
     }
 
     fn surface(
@@ -240,7 +259,7 @@ impl Planner<'_> {
             let problem = format!("{}/{} has no training sequence", self.row.dataset, self.row.subject);
             (problem, "a subject with one, or a recipe that reads a file".to_owned())
         })?;
-        Ok(TrainingFrames { sequence, frames, resolution: self.profile.resolution })
+        Ok(TrainingFrames { sequence, frames, resolution: self.resolution })
     }
 
     /// Everything that an avatar can depend on through its training frames.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use skinsplat_data::Capture;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// The part that a sequence plays.
@@ -41,7 +42,7 @@ pub struct SequenceInfo {
 }
 
 /// A person (or figure) and the sequences in which it was seen.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SubjectInfo {
     /// Id, unique within its data set.
     pub id: String,
@@ -49,9 +50,39 @@ pub struct SubjectInfo {
     pub capture: Capture,
     /// Its sequences.
     pub sequences: Vec<SequenceInfo>,
+    /// True if the registry says which frames are for what: the split of an experiment does not count then.
+    #[serde(default)]
+    pub split_given: bool,
+    /// What a reader of its numbers has to know: what its files leave out or what was guessed, what does not fit.
+    #[serde(default)]
+    pub notes: Vec<String>,
     /// Avatars that are registered for it.
     #[serde(default)]
     pub avatars: Vec<AvatarFile>,
+    /// Renders of its test sequences.
+    #[serde(default)]
+    pub renders: Vec<RenderedFrames>,
+}
+
+/// Frames of a test sequence that another program rendered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenderedFrames {
+    /// Where an experiment says they are. No key depends on it.
+    pub path: PathBuf,
+    /// Where those of this sequence are.
+    pub folder: PathBuf,
+    /// The sequence.
+    pub sequence: String,
+    /// The images that were found, by the names of the frames.
+    pub frames: BTreeMap<String, PathBuf>,
+    /// Digest of them all.
+    pub digest: String,
+    /// Gaussians of the avatar, if the folder says so.
+    pub splats: Option<u64>,
+    /// Size of the avatar in bytes, if the folder says so.
+    pub bytes: Option<u64>,
+    /// Time of a frame in milliseconds, if the folder says so.
+    pub milliseconds: Option<f64>,
 }
 
 /// An avatar that was fitted elsewhere.
@@ -86,7 +117,7 @@ pub enum AvatarState {
 }
 
 /// A data set that is present on this machine.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Dataset {
     /// Id, unique among the data sets given to one plan; a real data set carries the id that experiments name.
     pub id: String,
@@ -94,4 +125,16 @@ pub struct Dataset {
     pub title: String,
     /// Its subjects.
     pub subjects: Vec<SubjectInfo>,
+    /// Subjects that cannot be used.
+    #[serde(default)]
+    pub unreadable: Vec<Unreadable>,
+}
+
+/// A subject that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Unreadable {
+    /// Its id.
+    pub subject: String,
+    /// File, field and expectation, one line.
+    pub problem: String,
 }

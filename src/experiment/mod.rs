@@ -25,7 +25,9 @@ mod validate;
 mod versions;
 
 pub use avatar::{AvatarSource, PlannedAvatar, PlannedFit, TrainingFrames};
-pub use dataset::{AvatarFile, AvatarState, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
+pub use dataset::{
+    AvatarFile, AvatarState, Dataset, FrameInfo, RenderedFrames, Role, SequenceInfo, SubjectInfo, Unreadable,
+};
 pub use embedded::{EMBEDDED, FURTHER};
 pub use error::Error;
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};

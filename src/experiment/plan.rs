@@ -63,6 +63,9 @@ pub struct PlannedTable {
     pub variants: Vec<String>,
     /// The scoring protocol.
     pub protocol: ProtocolId,
+    /// What a reader has to know of the data, a clause per subject.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub data_notes: Vec<String>,
 }
 
 /// One test frame of one table: the truth is loaded once and every variant is rendered and scored against it, so that
@@ -171,15 +174,18 @@ impl Builder<'_> {
             .collect();
         let with_data = |(_, row): &(usize, &DataRow)| row.missing.is_none() && !variants.is_empty();
         for (row_index, row) in rows.iter().enumerate().filter(with_data) {
+            let resolution = experiment.resolution_on(source, &self.options.profile);
             let prepared = variants
                 .iter()
-                .map(|&(v, variant)| self.prepare(experiment, v, variant, row))
+                .map(|&(v, variant)| self.prepare(experiment, v, variant, row, resolution))
                 .collect::<Result<Vec<_>, _>>()?;
-            self.add_jobs((index, row_index), row, experiment, &protocol, &prepared);
+            self.add_jobs((index, row_index), row, experiment, (&protocol, resolution), &prepared);
         }
         let used = |dataset: &&Dataset| rows.iter().any(|row| row.dataset == dataset.id);
         let datasets = self.datasets.iter().filter(used).map(|d| (d.id.clone(), d.title.clone())).collect();
+        let data_notes = self.data_notes(&rows);
         Ok(PlannedTable {
+            data_notes,
             experiment: experiment.id.clone(),
             source,
             datasets,
@@ -189,6 +195,19 @@ impl Builder<'_> {
         })
     }
 
+    /// The notes of the subjects of some rows.
+    fn data_notes(&self, rows: &[DataRow]) -> Vec<String> {
+        let mut notes = Vec::new();
+        for row in rows.iter().filter(|row| row.missing.is_none()) {
+            let subject = self.subject(row);
+            let note = format!("{}: {}", subject.id, subject.notes.join("; "));
+            if !subject.notes.is_empty() && !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+        notes
+    }
+
     /// What a variant needs on a row, before any frame: its avatar and its strategy.
     fn prepare(
         &mut self,
@@ -196,6 +215,7 @@ impl Builder<'_> {
         index: usize,
         variant: &Variant,
         row: &DataRow,
+        resolution: Option<u32>,
     ) -> Result<Prepared, Error> {
         let invalid = |field: &str, (problem, expected): (String, String)| {
             Error::invalid(&experiment.id, format!("variants[{index}].{field}"), problem, expected)
@@ -204,13 +224,18 @@ impl Builder<'_> {
             None => None,
             Some(spec) => Some(catalog::strategy(spec).map_err(|why| invalid("strategy", why))?),
         };
-        let avatar = self.avatar(variant, row).map_err(|why| invalid("avatar", why))?;
+        let avatar = self.avatar(variant, row, resolution).map_err(|why| invalid("avatar", why))?;
         Ok(Prepared { variant: variant.id.clone(), avatar, strategy })
     }
 
     /// The key of the variant's avatar for a row's subject; the avatar is noted if it is new.
-    fn avatar(&mut self, variant: &Variant, row: &DataRow) -> Result<String, (String, String)> {
-        let planner = Planner { profile: &self.options.profile, subject: self.subject(row), row };
+    fn avatar(
+        &mut self,
+        variant: &Variant,
+        row: &DataRow,
+        resolution: Option<u32>,
+    ) -> Result<String, (String, String)> {
+        let planner = Planner { profile: &self.options.profile, resolution, subject: self.subject(row), row };
         let avatar = planner.avatar(variant)?;
         let key = avatar.key.clone();
         if self.avatars.iter().all(|known| known.key != key) {
@@ -225,11 +250,10 @@ impl Builder<'_> {
         place: (usize, usize),
         row: &DataRow,
         experiment: &Experiment,
-        protocol: &Arc<Protocol>,
+        (protocol, resolution): (&Arc<Protocol>, Option<u32>),
         variants: &[Prepared],
     ) {
         let test = find_sequence(self.subject(row), &row.sequence).clone();
-        let resolution = self.options.profile.resolution;
         let metrics = metrics_of(experiment);
         let lpips = metrics.contains(&MetricId::LPIPS);
         let weights = self.options.lpips_weights.as_ref().filter(|given| given.net == protocol.lpips.net);

@@ -72,8 +72,9 @@ fn chosen(options: &Options, subject: &str) -> bool {
 
 /// The experiment's sequences (subjects) in printed order; those that are not there are rows without data.
 fn own_rows(experiment: &Experiment, dataset: &Dataset, options: &Options) -> Vec<DataRow> {
+    let unreadable = dataset.unreadable.iter().map(|known| known.subject.as_str());
     let ids: Vec<&str> = if experiment.sequences.is_empty() {
-        dataset.subjects.iter().map(|s| s.id.as_str()).collect()
+        dataset.subjects.iter().map(|s| s.id.as_str()).chain(unreadable).collect()
     } else {
         experiment.sequences.iter().map(String::as_str).collect()
     };
@@ -85,7 +86,7 @@ fn own_rows(experiment: &Experiment, dataset: &Dataset, options: &Options) -> Ve
             subject.map_or_else(Vec::new, |subject| own_subject_rows(dataset, subject, split, options));
         if found.is_empty() {
             let missing = match subject {
-                None => format!("the data set has no subject `{id}`"),
+                None => unusable(dataset, id),
                 Some(_) => format!("no test sequence of `{id}` matches the experiment's split"),
             };
             rows.push(DataRow {
@@ -104,6 +105,14 @@ fn own_rows(experiment: &Experiment, dataset: &Dataset, options: &Options) -> Ve
     rows
 }
 
+/// Why a data set has no usable subject of this id.
+fn unusable(dataset: &Dataset, id: &str) -> String {
+    match dataset.unreadable.iter().find(|known| known.subject == id) {
+        Some(known) => known.problem.clone(),
+        None => format!("the data set has no subject `{id}`"),
+    }
+}
+
 /// The rows of a subject of the table's own data set. A subject with one test sequence is called by its own name, as in
 /// the paper.
 fn own_subject_rows(
@@ -117,7 +126,7 @@ fn own_subject_rows(
         None => sequence.role == role || (sequence.role == Role::Whole && split.is_some()),
     };
     let frames = |sequence: &SequenceInfo, role: Role| -> Vec<usize> {
-        let by_range = split.filter(|_| sequence.role == Role::Whole);
+        let by_range = split.filter(|_| !subject.split_given);
         indices(sequence, |frame| by_range.is_none_or(|split| split.selects(role, frame)))
     };
     let train = subject.sequences.iter().find(|s| plays(s, Role::Train)).map(|s| (s, frames(s, Role::Train)));
@@ -170,7 +179,12 @@ fn data_row(
     options: &Options,
 ) -> DataRow {
     let frames = options.subset.select(scored, &options.profile);
-    let missing = frames.is_empty().then(|| "no test frame is left by the split and the subset".to_owned());
+    let none_of = |which: &str| Some(format!("no {which} frame is left by the split and the subset"));
+    let missing = match &train {
+        _ if frames.is_empty() => none_of("test"),
+        Some((_, frames)) if frames.is_empty() => none_of("training"),
+        _ => None,
+    };
     let thin = |frames: Vec<usize>| evenly_spaced(&frames, options.profile.max_train_frames);
     DataRow {
         id: format!("{}/{}/{}", dataset.id, subject.id, test.id),

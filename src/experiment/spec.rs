@@ -1,11 +1,11 @@
 //! The experiment file: one table, described as data.
 
-use super::{EMBEDDED, Error, FURTHER, Paper, Replicate, Source, Split, catalog, seeds, validate};
+use super::{EMBEDDED, Error, FURTHER, Paper, Profile, Replicate, Source, Split, catalog, seeds, validate};
 use serde::{Deserialize, Serialize};
 use skinsplat_data::Capture;
 use skinsplat_metrics::MetricId;
 use skinsplat_posing::PRESETS;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How the ids of variants begin that [`Experiment::with_all_strategies`] adds.
 pub const ADDED_VARIANT: &str = "strategy-";
@@ -35,6 +35,9 @@ pub struct Experiment {
     pub method: String,
     /// The scoring protocol: a preset's id, or a preset with other choices, such as `haha+ssim=torchmetrics-1.4`.
     pub protocol: String,
+    /// Longer side to which images of the table's own data are reduced, pixels: the resolution of the compared method.
+    #[serde(default)]
+    pub resolution: Option<u32>,
     /// Whether the antialiased rasterizer renders.
     #[serde(default)]
     pub antialiased: bool,
@@ -186,12 +189,18 @@ pub enum AvatarRecipe {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         otherwise: Option<String>,
     },
+    /// Images that another program rendered, paired with the test frames by name; `renders.json` beside them may say
+    /// `splats`, `bytes` and `milliseconds`.
+    Renders {
+        /// The folder; `{subject}` and `{sequence}` stand for their ids. Relative to the experiment's file.
+        path: PathBuf,
+    },
 }
 
 impl AvatarRecipe {
     /// True if a strategy poses it.
     pub fn is_gaussian(&self) -> bool {
-        !matches!(self, Self::TexturedMesh { .. })
+        !matches!(self, Self::TexturedMesh { .. } | Self::Renders { .. })
     }
 
     /// The recipe by which it is fitted, or may be.
@@ -199,7 +208,10 @@ impl AvatarRecipe {
         match self {
             Self::Fit { name, .. } => Some(name),
             Self::File { otherwise, .. } => otherwise.as_deref(),
-            Self::SurfaceVertex {} | Self::SurfaceFace {} | Self::TexturedMesh { .. } => None,
+            Self::SurfaceVertex {}
+            | Self::SurfaceFace {}
+            | Self::TexturedMesh { .. }
+            | Self::Renders { .. } => None,
         }
     }
 }
@@ -211,7 +223,14 @@ impl Experiment {
     /// Names the file and the line or key.
     pub fn load(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
-        Self::parse(&text, &path.display().to_string())
+        let mut experiment = Self::parse(&text, &path.display().to_string())?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for variant in &mut experiment.variants {
+            if let AvatarRecipe::Renders { path } = &mut variant.avatar {
+                *path = folder.join(&path);
+            }
+        }
+        Ok(experiment)
     }
 
     /// Reads every `*.toml` of a folder, in the order of their names.
@@ -264,6 +283,12 @@ impl Experiment {
     pub fn protocol_on(&self, source: Source) -> &str {
         let other = self.stand_in.as_ref().and_then(|stand_in| stand_in.protocol.as_deref());
         if source == Source::StandIn { other.unwrap_or(&self.protocol) } else { &self.protocol }
+    }
+
+    /// Longer side of images on data of this source under a profile, pixels; native if none.
+    pub fn resolution_on(&self, source: Source, profile: &Profile) -> Option<u32> {
+        let own = self.resolution.filter(|_| source == Source::Own);
+        profile.resolution.into_iter().chain(own).min()
     }
 
     /// The experiment with a further row for each preset strategy that no variant has yet. The rows copy the avatar of

@@ -96,7 +96,7 @@ fn variant_is_possible(variant: &Variant, key: &str, file: &str) -> Result<(), E
             return fail("strategy", "missing".into(), "a strategy, such as \"quaternion-average\"");
         }
         (Some(_), false) => {
-            return fail("strategy", "given".into(), "none: a textured mesh has no Gaussians");
+            return fail("strategy", "given".into(), "none: there are no Gaussians to pose");
         }
         (Some(spec), true) => {
             if let Err((problem, expected)) = catalog::strategy(spec) {
@@ -134,12 +134,10 @@ fn sh_degree_is_possible(variant: &Variant) -> Result<(), (String, &'static str)
         (AvatarRecipe::Fit { .. }, Some(_)) => {
             Err(("given".to_owned(), "none: the fitting recipe has it (+sh_degree=2 varies it)"))
         }
-        (AvatarRecipe::TexturedMesh { .. } | AvatarRecipe::File { .. }, Some(degree)) if degree > 3 => {
-            Err((format!("{degree}"), "0 to 3"))
-        }
-        (AvatarRecipe::TexturedMesh { .. } | AvatarRecipe::File { .. }, Some(_)) => {
-            Err(("given".to_owned(), "none: it applies to Gaussians that are made here"))
-        }
+        (
+            AvatarRecipe::TexturedMesh { .. } | AvatarRecipe::File { .. } | AvatarRecipe::Renders { .. },
+            Some(_),
+        ) => Err(("given".to_owned(), "none: it applies to Gaussians that are made here")),
     }
 }
 

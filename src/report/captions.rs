@@ -51,6 +51,7 @@ pub(super) fn ran_on(
     if !options.subset.is_everything() {
         sentences.push(subset(&options.subset));
     }
+    sentences.extend(planned.data_notes.iter().map(|note| format!("Data of {note}")));
     if let Some(average) = &experiment.average {
         sentences.push(format!("{}: each sequence counts once", average.label));
     }
@@ -113,7 +114,7 @@ fn subset(subset: &Subset) -> String {
 /// Where the avatars of a variant come from that is read from files: name and digest of each, and what was fitted instead.
 /// None for a variant that is made here.
 pub(super) fn avatar_file(plan: &Plan, variant: &Variant, jobs: &[&Job]) -> Option<String> {
-    let AvatarRecipe::File { .. } = variant.avatar else { return None };
+    let (AvatarRecipe::File { .. } | AvatarRecipe::Renders { .. }) = variant.avatar else { return None };
     let mut subjects_by_origin: Vec<(String, Vec<&str>)> = Vec::new();
     for job in jobs {
         let avatar = job.variants.iter().find(|own| own.id == variant.id).map(|own| own.avatar.as_str())?;
@@ -141,6 +142,15 @@ fn origin(source: &AvatarSource) -> String {
             let short = digest.get(..12).unwrap_or(digest);
             let notes: String = notes.iter().map(|note| format!(", {note}")).collect();
             format!("the file {name} (SHA-256 {short}{notes})")
+        }
+        AvatarSource::Renders(renders) => {
+            let name = renders.folder.to_string_lossy().replace(char::is_control, "\u{fffd}");
+            let time = renders.milliseconds.map_or(String::new(), |ms| format!(", {ms} ms per frame"));
+            let size = renders.bytes.map_or(String::new(), |bytes| format!(", {bytes} bytes"));
+            format!(
+                "rendered by another program, the folder {name} ({}{size}{time})",
+                count(renders.frames.len(), "image")
+            )
         }
         AvatarSource::Fit { fit, .. } => format!("no file, so fitted by {}", fit.options.recipe.id),
         AvatarSource::Surface { .. } | AvatarSource::Textured { .. } => "made here".to_owned(),

@@ -49,6 +49,7 @@ impl<'a> Workshop<'a> {
                 let body = &self.library.sequence(&avatar.dataset, &avatar.subject, sequence)?.body;
                 Ok(Drawable::read(path, body)?.0)
             }
+            AvatarSource::Renders(renders) => Ok(Drawable::Renders(Box::new(renders.clone()))),
             AvatarSource::Surface { training, placement, bind_to, sh_degree, edge_mm } => {
                 let init = SurfaceInit {
                     placement: *placement,

@@ -1,9 +1,9 @@
 //! What a frame is drawn from: Gaussians bound to a body, a textured mesh, or both.
 
-use super::Error;
-use super::foreign;
-use super::textured::TexturedFiles;
-use skinsplat_core::scene::{Avatar, Camera, Image, Pose, PosedBody, RestBody};
+use super::foreign::{self, OnBody};
+use super::{Error, renders};
+use crate::experiment::RenderedFrames;
+use skinsplat_core::scene::{Avatar, Camera, Image, Mask, Pose, PosedBody, Rendered, RestBody, SceneError};
 use skinsplat_data::avatar::read_avatar;
 use skinsplat_fit::texture::{SAMPLES, TexturedBody};
 use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
@@ -12,17 +12,28 @@ use skinsplat_render::mesh::{Drawing, SamplePattern};
 use skinsplat_render::splat::Renderer;
 use std::borrow::Cow;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// What a frame is drawn from.
 #[derive(Debug)]
 pub enum Drawable<'m> {
     /// Gaussians, bound to the subject's body.
-    Gaussians(Box<BoundAvatar>),
+    Gaussians(Box<Bound>),
     /// The body's mesh under a texture.
     Textured(Cow<'m, TexturedBody>),
     /// Both, drawn together.
-    Hybrid(Box<BoundAvatar>, Cow<'m, TexturedBody>),
+    Hybrid(Box<Bound>, Cow<'m, TexturedBody>),
+    /// Nothing: what was drawn by another program.
+    Renders(Box<RenderedFrames>),
+}
+
+/// Gaussians on a body.
+#[derive(Debug)]
+pub struct Bound {
+    avatar: BoundAvatar,
+    /// The body that they hang on, if that is not the one in view but takes its poses.
+    body: Option<Arc<RestBody>>,
 }
 
 /// A body in a pose, seen by a camera.
@@ -34,23 +45,72 @@ pub struct PosedView<'a> {
     pub camera: &'a Camera,
     /// The body in the pose.
     pub body: PosedBody<'a>,
+    /// Name of the frame, if it is one of a sequence.
+    pub name: &'a str,
+    /// Width and height of the frame as it is stored; those of the camera if it is smaller.
+    pub stored: [u32; 2],
 }
 
 /// How a drawable is drawn, wherever it stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct Look<'a> {
     /// How its Gaussians are posed; a textured mesh needs none.
     pub strategy: Option<Strategy>,
-    /// What is behind it, sRGB values.
-    pub background: [f32; 3],
+    /// What is behind it.
+    pub background: Behind<'a>,
     /// Whether the antialiased rasterizer renders.
     pub antialiased: bool,
 }
 
-impl Look {
+/// What is behind a drawable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Behind<'a> {
+    /// One colour, sRGB values.
+    Colour([f32; 3]),
+    /// What the camera saw without the subject.
+    Picture(&'a Image),
+}
+
+impl Behind<'_> {
+    /// The colour to draw over; black under a picture, which is added afterwards.
+    fn colour(self) -> [f32; 3] {
+        match self {
+            Self::Colour(colour) => colour,
+            Self::Picture(_) => [0.0; 3],
+        }
+    }
+
+    /// Straight colours with alpha over what is behind.
+    ///
+    /// # Errors
+    /// Sizes that differ.
+    pub(super) fn around(self, rgb: &Image, alpha: &Mask) -> Result<Image, SceneError> {
+        let mut image = rgb.composited(alpha, self.colour())?;
+        self.add(&mut image, alpha);
+        Ok(image)
+    }
+
+    /// What was drawn over [`Behind::colour`], over what is behind.
+    fn under(self, Rendered { image, alpha, .. }: &Rendered) -> Image {
+        let mut image = image.clone();
+        self.add(&mut image, alpha);
+        image
+    }
+
+    /// Adds what shows of a picture.
+    fn add(self, image: &mut Image, alpha: &Mask) {
+        let Self::Picture(picture) = self else { return };
+        let behind = picture.pixels().iter().zip(alpha.values());
+        for (pixel, (behind, alpha)) in image.pixels_mut().iter_mut().zip(behind) {
+            *pixel = std::array::from_fn(|c| pixel[c] + (1.0 - alpha) * behind[c]);
+        }
+    }
+}
+
+impl Look<'_> {
     /// What the rasterizer is asked for through a camera.
     pub fn at<'c>(&self, camera: &'c Camera) -> View<'c> {
-        View::new(camera).over(self.background).antialiased(self.antialiased)
+        View::new(camera).over(self.background.colour()).antialiased(self.antialiased)
     }
 }
 
@@ -84,10 +144,21 @@ impl Drawable<'static> {
     /// A file that cannot be read or does not fit the body; the message names file, field and expectation.
     pub fn read(path: &Path, body: &RestBody) -> Result<(Self, Vec<String>), Error> {
         let loaded = read_avatar(path)?;
-        let files = TexturedFiles::beside(&loaded.files[0]);
-        let mesh = files.exist().then(|| files.read(body)).transpose()?;
-        let (avatar, notes) = foreign::on_body(loaded, body)?;
-        Ok((Self::new(&avatar, mesh.map(Cow::Owned), body)?, notes))
+        let has_shape = loaded.betas.is_some();
+        let OnBody { avatar, body: own, mesh, mut notes } = foreign::on_body(loaded, body)?;
+        if has_shape {
+            notes.push("the shape (betas) in its file is left: the body is the subject's".to_owned());
+        }
+        let own = own.map(Arc::new);
+        let mut bound = Bound::new(&avatar, own.as_deref().unwrap_or(body))?;
+        bound.body = own;
+        Ok((Self::of(bound, mesh.map(Cow::Owned)), notes))
+    }
+}
+
+impl Bound {
+    fn new(avatar: &Avatar, body: &RestBody) -> Result<Self, Error> {
+        Ok(Self { avatar: BoundAvatar::new(avatar, body)?.without_zero_bands(), body: None })
     }
 }
 
@@ -97,18 +168,21 @@ impl<'m> Drawable<'m> {
     /// # Errors
     /// An avatar that does not fit the body.
     pub fn new(avatar: &Avatar, mesh: Option<Cow<'m, TexturedBody>>, body: &RestBody) -> Result<Self, Error> {
-        let bound = Box::new(BoundAvatar::new(avatar, body)?.without_zero_bands());
-        Ok(match mesh {
-            Some(mesh) => Self::Hybrid(bound, mesh),
-            None => Self::Gaussians(bound),
-        })
+        Ok(Self::of(Bound::new(avatar, body)?, mesh))
+    }
+
+    fn of(bound: Bound, mesh: Option<Cow<'m, TexturedBody>>) -> Self {
+        match mesh {
+            Some(mesh) => Self::Hybrid(Box::new(bound), mesh),
+            None => Self::Gaussians(Box::new(bound)),
+        }
     }
 
     /// For each joint whether the strategy reads its rotation; none if nothing is known of what is read.
     pub fn joints_read(&self, strategy: &Strategy) -> Option<Vec<bool>> {
         match self {
-            Self::Gaussians(bound) | Self::Hybrid(bound, _) => Some(bound.joints_read(strategy)),
-            Self::Textured(_) => None,
+            Self::Gaussians(bound) | Self::Hybrid(bound, _) => Some(bound.avatar.joints_read(strategy)),
+            Self::Textured(_) | Self::Renders(_) => None,
         }
     }
 
@@ -116,20 +190,28 @@ impl<'m> Drawable<'m> {
     ///
     /// # Errors
     /// A pose of another body, a camera that breaks an invariant, Gaussians without a strategy.
-    pub fn draw(&self, view: &PosedView<'_>, look: &Look, scratch: &mut Scratch) -> Result<Drawn, Error> {
+    pub fn draw(&self, view: &PosedView<'_>, look: &Look<'_>, scratch: &mut Scratch) -> Result<Drawn, Error> {
         match self {
             Self::Gaussians(bound) => draw_gaussians(bound, None, view, look, scratch),
             Self::Hybrid(bound, mesh) => draw_gaussians(bound, Some(&**mesh), view, look, scratch),
             Self::Textured(mesh) => draw_mesh(mesh, view, look),
+            Self::Renders(renders) => load_render(renders, view, look),
         }
     }
 }
 
-fn draw_mesh(mesh: &TexturedBody, view: &PosedView<'_>, look: &Look) -> Result<Drawn, Error> {
+fn load_render(renders: &RenderedFrames, view: &PosedView<'_>, look: &Look<'_>) -> Result<Drawn, Error> {
+    let image = renders::draw(renders, view.name, view.camera, view.stored, look.background)?;
+    let (splats, visible_splats) = (renders.splats, None);
+    Ok(Drawn { image, splats, visible_splats, pose_seconds: 0.0, render_seconds: 0.0 })
+}
+
+fn draw_mesh(mesh: &TexturedBody, view: &PosedView<'_>, look: &Look<'_>) -> Result<Drawn, Error> {
     let start = Instant::now();
-    let image = mesh.draw(view.pose, view.camera, SamplePattern::new(SAMPLES), look.background)?.image;
+    let behind = look.background;
+    let drawn = mesh.draw(view.pose, view.camera, SamplePattern::new(SAMPLES), behind.colour())?;
     Ok(Drawn {
-        image,
+        image: behind.under(&drawn),
         splats: None,
         visible_splats: None,
         pose_seconds: 0.0,
@@ -138,22 +220,28 @@ fn draw_mesh(mesh: &TexturedBody, view: &PosedView<'_>, look: &Look) -> Result<D
 }
 
 fn draw_gaussians(
-    bound: &BoundAvatar,
+    Bound { avatar, body: own }: &Bound,
     mesh: Option<&TexturedBody>,
     view: &PosedView<'_>,
-    look: &Look,
+    look: &Look<'_>,
     Scratch { renderer, poser }: &mut Scratch,
 ) -> Result<Drawn, Error> {
     let strategy = look.strategy.ok_or(Error::NoStrategy)?;
+    let own = own.as_deref().map(|rest| {
+        let read = avatar.joints_read(&strategy);
+        PosedBody::with_rotations(rest, view.pose, |joint| read[joint])
+    });
+    let own = own.transpose()?;
     let start = Instant::now();
     let options = PoseOptions { seen_by: Some(view.camera), ..PoseOptions::default() };
-    let posed = poser.pose(bound, &view.body, &strategy, &options)?;
+    let posed = poser.pose(avatar, own.as_ref().unwrap_or(&view.body), &strategy, &options)?;
     let pose_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let drawing = mesh.map(|mesh| mesh.drawing(view.pose, view.camera, SamplePattern::new(SAMPLES)));
     let drawing = drawing.transpose()?;
     let underlay = drawing.as_ref().map(Drawing::underlay);
-    let image = renderer.render(&posed, &look.at(view.camera).with_underlay(underlay))?.image.clone();
+    let image =
+        look.background.under(renderer.render(&posed, &look.at(view.camera).with_underlay(underlay))?);
     Ok(Drawn {
         image,
         splats: Some(posed.len() as u64),

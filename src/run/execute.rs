@@ -2,12 +2,12 @@
 
 use super::avatars::Workshop;
 use super::drawable::{Drawable, Drawn, Look, Scratch};
-use super::frame::{Frame, Scored, background};
+use super::frame::{Frame, Scored, behind, check_background};
 use super::store::Store;
 use super::{Error, Library};
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
 use rayon::prelude::*;
-use skinsplat_data::Sequence;
+use skinsplat_data::{Sequence, Truth};
 use skinsplat_fit::train::Step;
 use skinsplat_metrics::lpips::{NetworkSource, OneFrame};
 use skinsplat_metrics::{PerceptualDistance, Wanted};
@@ -51,7 +51,13 @@ pub fn execute(
     store: &mut Store,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<(), Error> {
-    jobs.iter().try_for_each(|job| background(&job.protocol).map(drop))?;
+    for job in jobs {
+        let sequence = library.sequence(&job.dataset, &job.subject, &job.sequence)?;
+        sequence
+            .frames
+            .get(job.frame)
+            .map_or(Ok(()), |frame| check_background(&job.protocol, &frame.source))?;
+    }
     let avatars = prepare_avatars(plan, jobs, library, folder, watch)?;
     watch(Event::Frames(jobs.len()));
     let state = Mutex::new((store, Left::of(jobs)));
@@ -166,9 +172,9 @@ pub(super) fn test_sequence(job: &Job, library: &Library) -> Result<Sequence, Er
     Ok(job.resolution.map_or_else(|| sequence.clone(), |side| sequence.reduced(side)))
 }
 
-/// How a variant of a job is drawn.
-pub(super) fn look(job: &Job, variant: &JobVariant) -> Result<Look, Error> {
-    let background = background(&job.protocol)?;
+/// How a variant of a job is drawn where its truth is this one.
+pub(super) fn look<'a>(job: &Job, variant: &JobVariant, truth: &'a Truth) -> Result<Look<'a>, Error> {
+    let background = behind(&job.protocol, truth)?;
     Ok(Look { strategy: variant.strategy, background, antialiased: job.antialiased })
 }
 
@@ -183,7 +189,7 @@ fn run_variant(
     let avatar = avatar.as_ref().map_err(|problem| Error::Avatar { problem: problem.clone() })?;
     let wanted = Wanted { lpips: Some(distances), ..Wanted::of(&job.metrics) };
     let Scored { score, drawn, score_seconds } =
-        frame.evaluate(avatar, &look(job, variant)?, &job.protocol, wanted, scratch)?;
+        frame.evaluate(avatar, &look(job, variant, &frame.truth)?, &job.protocol, wanted, scratch)?;
     let Drawn { visible_splats, pose_seconds, render_seconds, .. } = drawn;
     let seconds = Seconds { pose: pose_seconds, render: render_seconds, score: score_seconds };
     Ok((Outcome::Scored { score, visible_splats }, seconds))

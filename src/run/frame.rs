@@ -1,9 +1,9 @@
 //! One frame, loaded: its truth, its camera, the body in its pose. Here drawing and scoring meet.
 
 use super::Error;
-use super::drawable::{Drawable, Drawn, Look, PosedView, Scratch};
+use super::drawable::{Behind, Drawable, Drawn, Look, PosedView, Scratch};
 use skinsplat_core::scene::PosedBody;
-use skinsplat_data::{Sequence, Truth};
+use skinsplat_data::{FrameSource, Sequence, Truth};
 use skinsplat_metrics::{AvatarStats, FrameScore, Protocol, Wanted};
 use std::time::Instant;
 
@@ -37,7 +37,8 @@ impl<'a> Frame<'a> {
             Some(read) => PosedBody::with_rotations(&sequence.body, pose, |joint| read[joint])?,
             None => PosedBody::new(&sequence.body, pose)?,
         };
-        Ok(Self { truth, view: PosedView { pose, camera, body } })
+        let (name, stored) = (frame.name.as_str(), sequence.stored_size(frame.camera));
+        Ok(Self { truth, view: PosedView { pose, camera, body, name, stored } })
     }
 
     /// Draws the frame and scores the drawing.
@@ -47,7 +48,7 @@ impl<'a> Frame<'a> {
     pub(super) fn evaluate(
         &self,
         drawable: &Drawable<'_>,
-        look: &Look,
+        look: &Look<'_>,
         protocol: &Protocol,
         wanted: Wanted<'_>,
         scratch: &mut Scratch,
@@ -61,10 +62,29 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// The background of a protocol.
+/// What a protocol puts behind the subject, for a truth.
 ///
 /// # Errors
-/// A captured background, which no data has.
-pub(super) fn background(protocol: &Protocol) -> Result<[f32; 3], Error> {
-    protocol.background_colour().ok_or_else(|| Error::NoBackground { protocol: protocol.id.clone() })
+/// A captured background, for a truth that has none.
+pub(super) fn behind<'a>(protocol: &Protocol, truth: &'a Truth) -> Result<Behind<'a>, Error> {
+    let captured = || truth.background.as_ref().map(Behind::Picture);
+    let behind = protocol.background_colour().map(Behind::Colour).or_else(captured);
+    behind.ok_or_else(|| no_background(protocol))
+}
+
+/// Checks what is known before a truth is loaded: a captured background needs a file.
+///
+/// # Errors
+/// As [`behind`].
+pub(super) fn check_background(protocol: &Protocol, source: &FrameSource) -> Result<(), Error> {
+    match source {
+        FrameSource::Files(files) if protocol.background_colour().is_none() && files.background.is_none() => {
+            Err(no_background(protocol))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn no_background(protocol: &Protocol) -> Error {
+    Error::NoBackground { protocol: protocol.id.clone() }
 }

@@ -3,9 +3,9 @@
 //! A picture has the truth and every variant side by side, in the table's order, cropped to the subject; below each variant
 //! its absolute error, four times enlarged.
 
-use super::drawable::Scratch;
+use super::drawable::{Behind, Scratch};
 use super::execute::{look, prepare_avatars, test_sequence};
-use super::frame::{Frame, background};
+use super::frame::{Frame, behind};
 use super::{Error, Event, Library};
 use crate::experiment::{Job, Outcome, Plan, Records};
 use skinsplat_core::scene::{Image, Mask, SceneError};
@@ -49,9 +49,12 @@ pub fn write(
             let avatar = avatars[&variant.avatar]
                 .as_ref()
                 .map_err(|problem| Error::Avatar { problem: problem.clone() })?;
-            images.push(avatar.draw(&frame.view, &look(job, variant)?, &mut scratch)?.image);
+            images.push(avatar.draw(&frame.view, &look(job, variant, &frame.truth)?, &mut scratch)?.image);
         }
-        let truth = frame.truth.rgb.composited(&frame.truth.alpha, background(&job.protocol)?)?;
+        let truth = match behind(&job.protocol, &frame.truth)? {
+            Behind::Colour(colour) => frame.truth.rgb.composited(&frame.truth.alpha, colour)?,
+            Behind::Picture(_) => frame.truth.rgb.clone(),
+        };
         let table = &plan.tables[job.table];
         let name = file_name(&format!("{}-{}-{}", table.experiment, table.rows[job.row].label, job.name));
         save_png(&folder.join(&name), &strip(&truth, &images, &frame.truth.alpha)?)?;

@@ -2,7 +2,7 @@
 
 use super::Error;
 use super::drawable::{Drawable, Look, Scratch};
-use super::frame::Frame;
+use super::frame::{Frame, behind};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use skinsplat_core::scene::RestBody;
@@ -68,12 +68,12 @@ fn of_sequence(
     sequence: &Sequence,
     ssim: bool,
 ) -> Result<(f64, Option<f64>), Error> {
-    let background = protocol.background_colour().unwrap_or([1.0; 3]);
-    let look = Look { strategy: Some(*strategy), background, antialiased: false };
     let read = drawable.joints_read(strategy);
     let wanted = Wanted::of(if ssim { &[MetricId::PSNR, MetricId::SSIM] } else { &[MetricId::PSNR] });
     let score = |scratch: &mut Scratch, index: usize| {
         let frame = Frame::load(sequence, index, read.as_deref())?;
+        let background = behind(protocol, &frame.truth)?;
+        let look = Look { strategy: Some(*strategy), background, antialiased: false };
         Ok(frame.evaluate(drawable, &look, protocol, wanted, scratch)?.score)
     };
     let frames = (0..sequence.frames.len()).into_par_iter();

@@ -1,11 +1,16 @@
 //! The data at hand: loaded subjects, and what the planner needs to know about them.
 
-use super::Error;
 use super::drawable::Drawable;
-use crate::experiment::{AvatarFile, AvatarState, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo};
+use super::{Error, renders};
+use crate::check;
+use crate::experiment::{
+    AvatarFile, AvatarState, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo, Unreadable,
+};
 use rayon::prelude::*;
 use skinsplat_data::avatar::read_avatar;
-use skinsplat_data::{Sequence, Subject};
+use skinsplat_data::select::evenly_spaced;
+use skinsplat_data::{FrameSource, Sequence, Subject};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A data set whose subjects are loaded; no image is decoded.
@@ -19,6 +24,10 @@ pub struct LoadedDataset {
     pub subjects: Vec<Subject>,
     /// Avatars that somebody else made of them.
     pub avatars: Vec<RegisteredAvatar>,
+    /// Ids of the subjects for which the registry says which frames are for what.
+    pub splits_given: BTreeSet<String>,
+    /// Subjects that cannot be used.
+    pub unreadable: Vec<Unreadable>,
 }
 
 /// Avatars that somebody else made, one per subject.
@@ -44,17 +53,33 @@ impl RegisteredAvatar {
 #[derive(Debug)]
 pub struct Library {
     datasets: Vec<LoadedDataset>,
+    /// Where renders of other programs are.
+    renders: Vec<PathBuf>,
 }
 
 impl Library {
     /// A library of these data sets.
     pub fn new(datasets: Vec<LoadedDataset>) -> Self {
-        Self { datasets }
+        Self { datasets, renders: Vec::new() }
     }
 
     /// Registers an avatar of every subject, besides those of its data set.
     pub fn register(&mut self, avatar: &RegisteredAvatar) {
         self.datasets.iter_mut().for_each(|dataset| dataset.avatars.push(avatar.clone()));
+    }
+
+    /// Looks for renders of every test sequence in a folder, as an experiment names it.
+    pub fn look_for_renders(&mut self, path: &Path) {
+        if !self.renders.iter().any(|known| known == path) {
+            self.renders.push(path.to_owned());
+        }
+    }
+
+    /// Subjects that cannot be used, each with its data set.
+    pub fn unreadable(&self) -> impl Iterator<Item = (&str, &Unreadable)> {
+        self.datasets
+            .iter()
+            .flat_map(|dataset| dataset.unreadable.iter().map(|own| (dataset.id.as_str(), own)))
     }
 
     /// What the planner needs: names, counts and content digests. Reads every file once, to digest it, and binds every
@@ -64,9 +89,10 @@ impl Library {
     /// A file that cannot be read.
     pub fn describe(&self) -> Result<Vec<Dataset>, Error> {
         let describe = |dataset: &LoadedDataset| {
-            let describe = |subject| describe_subject(subject, &dataset.avatars);
+            let describe = |subject| describe_subject(subject, dataset, &self.renders);
             let subjects = dataset.subjects.iter().map(describe).collect::<Result<_, _>>()?;
-            Ok(Dataset { id: dataset.id.clone(), title: dataset.title.clone(), subjects })
+            let (id, title) = (dataset.id.clone(), dataset.title.clone());
+            Ok(Dataset { id, title, subjects, unreadable: dataset.unreadable.clone() })
         };
         self.datasets.iter().map(describe).collect()
     }
@@ -86,21 +112,43 @@ impl Library {
 
 fn describe_subject(
     subject: &Subject,
-    avatars: &[RegisteredAvatar],
+    dataset: &LoadedDataset,
+    renders: &[PathBuf],
 ) -> Result<SubjectInfo, skinsplat_data::Error> {
     let roles =
         subject.train.iter().map(|s| (s, Role::Train)).chain(subject.test.iter().map(|s| (s, Role::Test)));
     let sequences: Vec<(&Sequence, Role)> = roles.collect();
     let describe = |&(sequence, role): &(&Sequence, Role)| {
         let frame =
-            |f: &skinsplat_data::FrameRef| FrameInfo { name: f.name.clone(), time: f.pose, camera: f.camera };
+            |f: &skinsplat_data::FrameRef| FrameInfo { name: f.name.clone(), time: f.time, camera: f.camera };
         let digest = sequence.digest()?;
         let frames = sequence.frames.iter().map(frame).collect();
         Ok(SequenceInfo { id: sequence.id.clone(), role, digest, frames })
     };
     let sequences = sequences.par_iter().map(describe).collect::<Result<_, skinsplat_data::Error>>()?;
-    let avatars = avatars.iter().map(|avatar| describe_avatar(avatar, subject)).collect();
-    Ok(SubjectInfo { id: subject.id.clone(), capture: subject.capture, sequences, avatars })
+    let avatars = dataset.avatars.iter().map(|avatar| describe_avatar(avatar, subject)).collect();
+    let places = renders.iter().flat_map(|path| subject.test.iter().map(move |sequence| (path, sequence)));
+    let renders = places.map(|(path, sequence)| renders::describe(path, &subject.id, sequence));
+    let renders = renders.collect::<Result<_, _>>()?;
+    let split_given = dataset.splits_given.contains(&subject.id);
+    let mut notes = subject.notes.clone();
+    notes.extend(subject.sequences().flat_map(misfits));
+    let (id, capture) = (subject.id.clone(), subject.capture);
+    Ok(SubjectInfo { id, capture, sequences, split_given, notes, avatars, renders })
+}
+
+/// Frames of a sequence that are looked at before a run.
+const LOOKS: usize = 8;
+
+/// What a quick look at a sequence finds; `reproduce check` looks at all of it. What is generated fits itself.
+fn misfits(sequence: &Sequence) -> Vec<String> {
+    let stored = |frame: &skinsplat_data::FrameRef| matches!(frame.source, FrameSource::Files(_));
+    if !sequence.frames.iter().any(stored) {
+        return Vec::new();
+    }
+    let all: Vec<usize> = (0..sequence.frames.len()).collect();
+    let (_, findings) = check::sequence(sequence, &evenly_spaced(&all, Some(LOOKS)));
+    findings.iter().map(|found| format!("check finds {} in {}", found.kind, sequence.id)).collect()
 }
 
 /// What is where the avatar of a subject should be.

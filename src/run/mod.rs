@@ -21,6 +21,7 @@ pub mod gallery;
 pub mod held_out;
 mod library;
 pub mod provenance;
+mod renders;
 pub mod store;
 pub mod textured;
 

@@ -2,7 +2,7 @@
 
 use super::Error;
 use glam::DVec3;
-use skinsplat_core::scene::RestBody;
+use skinsplat_core::scene::{Image, RestBody};
 use skinsplat_data::avatar::mesh_beside;
 use skinsplat_data::{frames, npy};
 use skinsplat_fit::texture::TexturedBody;
@@ -61,6 +61,25 @@ impl TexturedFiles {
         let uv = bare.uv.clone().ok_or_else(no_uv)?;
         Ok(TexturedBody { body: Arc::new(body), uv, texture: Texture::new(image) })
     }
+}
+
+/// A body under a texture that belongs to an avatar's file.
+///
+/// # Errors
+/// A body without texture coordinates.
+pub(super) fn covered(image: Image, body: &RestBody, path: &Path) -> Result<TexturedBody, Error> {
+    let Some(uv) = body.uv.clone() else {
+        let expected =
+            "texture coordinates (vt and ft) in the body model, to draw the mesh under the Gaussians";
+        return Err(skinsplat_data::Error::invalid(
+            path,
+            "texture",
+            "the body has no place for it",
+            expected,
+        )
+        .into());
+    };
+    Ok(TexturedBody { body: Arc::new(body.clone()), uv, texture: Texture::new(image) })
 }
 
 fn is_png(path: &Path) -> bool {

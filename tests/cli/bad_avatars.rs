@@ -108,7 +108,13 @@ fn an_avatar_that_does_not_fit_the_body() {
         plain = plain.drop(name);
     }
     desk.put("other.ply", plain.text());
-    skin(&body).refuses(&["other.ply", "no binding"], "a static scene");
+    let answer = skin(&body).exits(0, "a static scene hangs on the nearest points of the body");
+    assert!(
+        answer.err.contains("other.ply: no binding in the file: skinning weights of the nearest"),
+        "{}",
+        answer.err
+    );
+    std::fs::remove_file(desk.path("out.ply")).unwrap();
     desk.put("other.ply", Ply::bound().text());
     skin(&[&body[..], &["--frame", "2"]].concat()).refuses(&["poses.npz", "--frame 2", "below 2"], "frame");
     skin(&[&body[..], &["--strategy", "guess"]].concat()).refuses(&["--strategy", "guess"], "strategy");

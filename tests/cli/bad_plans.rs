@@ -84,7 +84,11 @@ fn registries_that_are_wrong() {
         ("dataset = 1".to_owned(), vec!["line 1"], "no table"),
         ("[[dataset]".to_owned(), vec!["line 1"], "not TOML"),
         (format!("{good}subjects = [\"../ava\"]\n"), vec!["dataset[0].subjects"], "a path as a name"),
-        (good.replace("layout = \"folder\"", "layout = \"neuman\""), vec!["layout", "neuman"], "no reader"),
+        (
+            good.replace("layout = \"folder\"", "layout = \"neuman\""),
+            vec!["cameras.txt", "COLMAP"],
+            "another layout",
+        ),
     ] {
         desk.put("sets.toml", text);
         let before = desk.contents();

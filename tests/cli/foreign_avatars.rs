@@ -184,7 +184,8 @@ fn exports_of_splatting_avatar_are_recognised() {
     // What is canonical on a turned mesh is carried back: the turn of 90 degrees about z is gone at rest.
     let body = Subject::load(&data("small/tiny"), &Default::default()).unwrap().train.remove(0).body;
     let loaded = skinsplat_data::avatar::read_avatar(&desk.path("export")).unwrap();
-    let (avatar, notes) = skinsplat::run::foreign::on_body(loaded, &body).unwrap();
+    let skinsplat::run::foreign::OnBody { avatar, notes, .. } =
+        skinsplat::run::foreign::on_body(loaded, &body).unwrap();
     assert_eq!(notes.len(), 1);
     for rotation in &avatar.gaussians.rotations {
         assert!(rotation[0].abs() > 1.0 - 1e-5, "{rotation:?}");

@@ -32,8 +32,10 @@ fn top_level_help() {
       plan         Show what a run would do, without doing it
       report       Print the tables of a run again, or compare them with a baseline
       list         List experiments, datasets, strategies, recipes, protocols or metrics
+      check        See whether bodies, poses, cameras and masks of a data set fit together
+      fetch-help   Say who has a data set, what to unpack where, and what a registry says of it
       fit          Fit an avatar to a subject's training frames
-      render       Render a 3DGS PLY, posed or as it stands
+      render       Render an avatar, posed or as it stands
       skin         Pose an avatar and write a plain static 3DGS PLY
       score        Score renders against truth: two images, or two folders whose frames pair up by name
       blend        Blend rotations with every solver: check a shader or an engine against the exact
@@ -54,7 +56,7 @@ fn top_level_help() {
 
     Exit codes:
       0  done
-      1  ran, and the verdict is bad (a regression against a baseline)
+      1  ran, and the verdict is bad (a regression against a baseline, data that does not fit)
       2  could not run: usage, input or disk; one line on stderr says which file and field
       3  incomplete: some frames failed or are missing from the tables
     "#);

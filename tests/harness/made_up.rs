@@ -42,7 +42,8 @@ pub(super) fn sequence(id: &str, role: Role, frames: usize) -> SequenceInfo {
 }
 
 pub(super) fn subject(id: &str, capture: Capture, sequences: Vec<SequenceInfo>) -> SubjectInfo {
-    SubjectInfo { id: id.into(), capture, sequences, avatars: Vec::new() }
+    let (notes, avatars, renders) = Default::default();
+    SubjectInfo { id: id.into(), capture, sequences, split_given: false, notes, avatars, renders }
 }
 
 /// The seventh table's own data: subjects `anna` and `bob`.
@@ -54,7 +55,8 @@ pub(super) fn own_data(test_frames: usize) -> Dataset {
         person.avatars.push(fitted_file(id));
         person
     };
-    Dataset { id: "gymnasts".into(), title: "Gymnasts".into(), subjects: vec![person("anna"), person("bob")] }
+    let subjects = vec![person("anna"), person("bob")];
+    Dataset { id: "gymnasts".into(), title: "Gymnasts".into(), subjects, unreadable: Vec::new() }
 }
 
 /// The file of a subject's fitted avatar.
@@ -79,7 +81,7 @@ pub(super) fn figures() -> Dataset {
         figure("multi", Capture::Multiview),
         figure("hands", Capture::Hands),
     ];
-    Dataset { id: "figures".into(), title: "Figures".into(), subjects }
+    Dataset { id: "figures".into(), title: "Figures".into(), subjects, unreadable: Vec::new() }
 }
 
 pub(super) fn score(protocol: &str, psnr: f64, ssim: f64, lpips: Option<f64>) -> FrameScore {

@@ -2,8 +2,8 @@
 
 use super::made_up::{figures, options, own_data, sequence, subject, table_7};
 use skinsplat::experiment::{
-    AvatarRecipe, AvatarSource, AvatarState, Dataset, Experiment, Options, Plan, PlannedAvatar, Profile,
-    Role, Shard, Source, Subset, TrainingFrames, plan,
+    AvatarRecipe, AvatarSource, AvatarState, Dataset, Experiment, FrameInfo, Options, Plan, PlannedAvatar,
+    Profile, Role, SequenceInfo, Shard, Source, SubjectInfo, Subset, TrainingFrames, plan,
 };
 use skinsplat_data::Capture;
 use skinsplat_data::key::canonical_json;
@@ -227,14 +227,41 @@ fn profiles_thin_frames_evenly() {
 }
 
 /// One sequence that an experiment splits by frame number and camera, as PeopleSnapshot and GalaBasketball are.
+/// A data set of one subject.
+fn dataset(id: &str, subject: SubjectInfo) -> Dataset {
+    Dataset { id: id.into(), title: id.into(), subjects: vec![subject], unreadable: Vec::new() }
+}
+
+/// Each table trains and tests on its own method's frames of what a layout has, unless the registry says otherwise.
+#[test]
+fn splits_cut_sequences_of_a_role_unless_the_registry_has_its_own() {
+    let train: Vec<FrameInfo> = sequence("", Role::Train, 456).frames.into_iter().step_by(4).collect();
+    let test: Vec<FrameInfo> =
+        sequence("", Role::Test, 676).frames.into_iter().skip(456).step_by(4).collect();
+    let of = |id: &str, role, frames: &Vec<FrameInfo>| SequenceInfo {
+        frames: frames.clone(),
+        ..sequence(id, role, 0)
+    };
+    let sequences = vec![of("train", Role::Train, &train), of("test", Role::Test, &test)];
+    let mut person = subject("male-3", Capture::Monocular, sequences);
+    let experiments = Experiment::embedded();
+    let counts = |person: &SubjectInfo, table: usize| {
+        let plan = planned(&experiments[table..=table], &[dataset("peoplesnapshot", person.clone())]);
+        (training(&plan).frames.len(), plan.jobs.len(), plan.jobs[0].resolution)
+    };
+    assert_eq!(counts(&person, 1), (19, 55, Some(540)), "iHuman's frames");
+    assert_eq!(counts(&person, 4), (114, 55, Some(540)), "Animatable's frames");
+    assert_eq!(counts(&person, 2).2, None, "SplattingAvatar's resolution is that of the images");
+    person.split_given = true;
+    assert_eq!(counts(&person, 1), (114, 55, Some(540)), "the registry's frames");
+}
+
 #[test]
 fn splits_cut_whole_sequences() {
     let experiments = Experiment::embedded();
     let mut whole = sequence("male-3", Role::Whole, 676);
     let person = subject("male-3", Capture::Monocular, vec![whole.clone()]);
-    let data =
-        Dataset { id: "peoplesnapshot".into(), title: "PeopleSnapshot".into(), subjects: vec![person] };
-    let plan = planned(&experiments[1..2], &[data]);
+    let plan = planned(&experiments[1..2], &[dataset("peoplesnapshot", person)]);
     assert_eq!((plan.jobs.len(), training(&plan).frames.len()), (55, 19));
     assert_eq!((plan.jobs[0].frame, plan.jobs[54].frame), (456, 672));
     let missing: Vec<&str> =
@@ -251,16 +278,14 @@ fn splits_cut_whole_sequences() {
         })
         .collect();
     let ball = subject("dribble", Capture::Multiview, vec![whole]);
-    let data = Dataset { id: "galabasketball".into(), title: "GalaBasketball".into(), subjects: vec![ball] };
-    let plan = planned(&experiments[3..4], &[data]);
+    let plan = planned(&experiments[3..4], &[dataset("galabasketball", ball)]);
     assert_eq!((plan.jobs.len(), training(&plan).frames.len()), (30, 180));
     assert_eq!(plan.jobs[0].frame, 6 * 60);
     assert_eq!(plan.tables[0].protocol.id, "animatable-gala");
 
     let takes = ["train/Take4", "train/Take6", "train/Take8"].map(|id| sequence(id, Role::Train, 5));
     let hands = subject("00016", Capture::Hands, takes.to_vec());
-    let data = Dataset { id: "xhumans".into(), title: "X-Humans".into(), subjects: vec![hands] };
-    let plan = planned(&experiments[5..], &[data]);
+    let plan = planned(&experiments[5..], &[dataset("xhumans", hands)]);
     assert_eq!(plan.tables[0].rows[0].sequence, "train/Take6");
     assert_eq!(training(&plan).sequence, "train/Take4");
 }

@@ -30,7 +30,7 @@ pub fn npz(path: &Path, arrays: &[(&str, &[u64], Values)]) {
 }
 
 /// The bytes of an `.npy` file.
-fn npy<T: npyz::AutoSerialize + Clone>(shape: &[u64], values: &[T]) -> Vec<u8> {
+pub fn npy<T: npyz::AutoSerialize + Clone>(shape: &[u64], values: &[T]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut writer =
         npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut bytes).begin_nd().unwrap();

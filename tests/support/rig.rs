@@ -76,6 +76,16 @@ pub(crate) fn moved(pose: &Pose, rotation: DQuat, translation: DVec3) -> Pose {
     moved
 }
 
+/// The pose with every joint scaled by a factor of its own, 0.5 to 2, on its own part of the body and those beyond.
+pub(crate) fn scaled(pose: &Pose, seed: u64) -> Pose {
+    let mut noise = Noise(seed);
+    let mut scaled = pose.clone();
+    for local in &mut scaled.locals {
+        local.scale = DVec3::splat(2f64.powf(noise.next() * 0.4));
+    }
+    scaled
+}
+
 pub(crate) fn gaussians(means: Vec<Vec3>, seed: u64, sh_degree: usize) -> Gaussians {
     let mut noise = Noise(seed);
     let n = means.len();

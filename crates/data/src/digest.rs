@@ -96,13 +96,15 @@ impl Fingerprint {
     fn source(&mut self, source: &FrameSource) -> Result<(), Error> {
         match source {
             FrameSource::Generated { generator, frame } => {
-                self.bytes(generator.key().as_bytes());
+                self.bytes(generator.key()?.as_bytes());
                 self.count(*frame);
             }
-            FrameSource::Files { image, mask } => {
-                self.bytes(&error::read_bytes(image, "image", "a frame of the sequence")?);
-                if let Some(mask) = mask {
-                    self.bytes(&error::read_bytes(mask, "mask", "a frame of the sequence")?);
+            FrameSource::Files(files) => {
+                for path in files.paths() {
+                    self.bytes(&error::read_bytes(path, "image", "a frame of the sequence")?);
+                }
+                if let Some(name) = files.mask.as_ref().and_then(|mask| mask.reading.name()) {
+                    self.bytes(name.as_bytes());
                 }
             }
         }
@@ -173,6 +175,7 @@ pub(super) fn of_truths(truths: &[Truth]) -> SourceDigest {
         hash.singles(truth.rgb.pixels().as_flattened());
         hash.count(truth.alpha.width()).count(truth.alpha.height());
         hash.singles(truth.alpha.values());
+        truth.background.iter().for_each(|behind| hash.singles(behind.pixels().as_flattened()));
     }
     hash.finish()
 }
@@ -189,12 +192,12 @@ mod tests {
     struct Grey(f32);
 
     impl FrameGenerator for Grey {
-        fn truth(&self, _: usize) -> Truth {
-            Truth { rgb: Image::filled(8, 4, [self.0; 3]), alpha: Mask::filled(8, 4, 1.0) }
+        fn truth(&self, _: usize) -> Result<Truth, Error> {
+            Ok(Truth::new(Image::filled(8, 4, [self.0; 3]), Mask::filled(8, 4, 1.0)))
         }
 
-        fn key(&self) -> String {
-            "grey".to_owned()
+        fn key(&self) -> Result<String, Error> {
+            Ok("grey".to_owned())
         }
     }
 
@@ -223,7 +226,7 @@ mod tests {
             poses: vec![Pose::rest(&body.skeleton)].into(),
             body: Arc::new(body),
             cameras: vec![camera].into(),
-            frames: vec![FrameRef { name: "image".into(), pose: 0, camera: 0, source }],
+            frames: vec![FrameRef { name: "image".into(), time: 0, pose: 0, camera: 0, source }],
             stored_sizes: None,
         }
     }

@@ -122,12 +122,14 @@ pub fn read_text(path: &Path, field: &str, expected: &str) -> Result<String, Err
     String::from_utf8(bytes).map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))
 }
 
-/// Reads a JSON file into a type; the error names the place in the text.
+/// Reads a JSON file into a type; the error names the place in the text. A byte order mark before it is skipped, as
+/// RFC 8259 allows.
 pub fn read_json<T: serde::de::DeserializeOwned>(
     path: &Path,
     field: &str,
     expected: &str,
 ) -> Result<T, Error> {
     let text = read_text(path, field, expected)?;
-    serde_json::from_str(&text).map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))
+    let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    serde_json::from_str(json).map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))
 }

@@ -6,23 +6,22 @@
 //!                      poses.npz           betas and poses (used if there; transforms.json may hold them instead)
 //!                      images/*.png, masks/*.png, or camNN/images/*.png, camNN/masks/*.png
 //! <subject>/gt_normal_offset.npy           clothing, (V) metres along the rest normals; see [`Options`]
-//! models/<model>                           in the subject's folder or one of the two above it
+//! models/<model>                           in the subject's folder or one of the two above it (of a link: above either end)
 //! ```
 //! Sequences named `train*` are for fitting, those named `test*` for evaluation.
 
+use super::models::Models;
 use super::poses::{self, PoseTrack};
-use super::{Capture, Error, Sequence, body, camera, error, npy};
-use super::{FrameRef, FrameSource};
+use super::{Capture, Error, Sequence, camera, error, listing};
+use super::{FrameFiles, FrameRef, FrameSource, MaskFile};
 use serde::Deserialize;
-use skinsplat_core::scene::{Body, Camera, RestBody};
-use std::collections::BTreeMap;
+use skinsplat_core::scene::Camera;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// How a subject is loaded.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// A body model to use instead of the one that the sequences name.
+    /// A body model to use instead of the one that the sequences name, or a folder of models by gender.
     pub model: Option<PathBuf>,
     /// Displace the body by `gt_normal_offset.npy`. Off by default: an evaluation does not know the clothing.
     pub clothing: bool,
@@ -39,6 +38,8 @@ pub struct Subject {
     pub train: Vec<Sequence>,
     /// Sequences to evaluate on, by name.
     pub test: Vec<Sequence>,
+    /// What was guessed, left out or not read, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl Subject {
@@ -57,8 +58,8 @@ impl Subject {
         let cameras = sequences().map(|s| s.cameras.len()).max();
         let joints = sequences().map(|s| s.body.skeleton.num_joints()).max();
         let capture = capture_of(folder, cameras.zip(joints))?;
-        let id = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        Ok(Self { id, capture, train, test })
+        let id = listing::file_name(folder);
+        Ok(Self { id, capture, train, test, notes: models.notes().to_vec() })
     }
 
     /// All sequences, training first.
@@ -110,12 +111,10 @@ fn capture_of(folder: &Path, cameras_and_joints: Option<(usize, usize)>) -> Resu
 }
 
 fn sequence_folders(folder: &Path, prefix: &str) -> Result<Vec<String>, Error> {
-    let entries = std::fs::read_dir(folder)
-        .map_err(|cause| Error::read(folder, "dataset", "a folder of sequences", cause))?;
-    let mut names: Vec<String> = entries
-        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter(|name| name.starts_with(prefix) && folder.join(name).join("transforms.json").is_file())
-        .collect();
+    let folders = listing::folders(folder, "dataset")?;
+    let names = folders.iter().filter(|path| path.join("transforms.json").is_file());
+    let mut names: Vec<String> =
+        names.map(|path| listing::file_name(path)).filter(|name| name.starts_with(prefix)).collect();
     names.sort();
     Ok(names)
 }
@@ -166,70 +165,10 @@ fn load_sequence(folder: &Path, id: &str, models: &mut Models) -> Result<Sequenc
         error::read_json(&files.listing, "frames", "model, cameras and frames of a sequence")?;
     let cameras = files.cameras()?;
     let track = files.poses()?;
-    let body = models.named(&files.listing, transforms.model.as_deref(), &track.betas)?;
+    let body = models.of_track(&files.listing, transforms.model.as_deref(), &track)?;
     let poses = track.poses(&body.skeleton)?;
     let frames = frames_of(&files, transforms.frames, poses.len(), cameras.len())?;
     Ok(Sequence { id: id.to_owned(), body, poses, cameras: cameras.into(), frames, stored_sizes: None })
-}
-
-/// Body models that were loaded for a subject, and the shapes of them that its sequences share.
-pub(super) struct Models<'a> {
-    subject: &'a Path,
-    options: &'a Options,
-    loaded: BTreeMap<PathBuf, Model>,
-}
-
-struct Model {
-    body: Body,
-    shapes: Vec<(Vec<f64>, Arc<RestBody>)>,
-}
-
-impl<'a> Models<'a> {
-    pub(super) fn new(subject: &'a Path, options: &'a Options) -> Self {
-        Self { subject, options, loaded: BTreeMap::new() }
-    }
-
-    /// The body of a shape; `source` is the file that names the model.
-    pub(super) fn named(
-        &mut self,
-        source: &Path,
-        name: Option<&str>,
-        betas: &[f64],
-    ) -> Result<Arc<RestBody>, Error> {
-        let path = self.find(source, name)?;
-        if !self.loaded.contains_key(&path) {
-            self.loaded.insert(path.clone(), Model { body: body::load(&path)?, shapes: Vec::new() });
-        }
-        let Model { body, shapes } = self.loaded.get_mut(&path).expect("inserted above");
-        if let Some((_, rest)) = shapes.iter().find(|(known, _)| known == betas) {
-            return Ok(rest.clone());
-        }
-        let mut rest = body.shaped(betas).map_err(|e| Error::scene(source, e))?;
-        let offsets = self.subject.join("gt_normal_offset.npy");
-        if self.options.clothing && offsets.is_file() {
-            let array = npy::read(&offsets)?;
-            let values: Vec<f32> = array.values.iter().map(|&v| v as f32).collect();
-            rest = rest.with_normal_offset(&values).map_err(|e| Error::scene(&offsets, e))?;
-        }
-        let rest = Arc::new(rest);
-        shapes.push((betas.to_vec(), rest.clone()));
-        Ok(rest)
-    }
-
-    /// A given model, or the named one in `models` of the subject's folder or of one of the two above it.
-    fn find(&self, source: &Path, name: Option<&str>) -> Result<PathBuf, Error> {
-        if let Some(model) = &self.options.model {
-            return Ok(model.clone());
-        }
-        let Some(name) = name else {
-            return Err(Error::invalid(source, "model", "missing", "a body model, named here or given"));
-        };
-        let places = ["models", "../models", "../../models"].map(|place| self.subject.join(place).join(name));
-        places.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
-            let expected = "a file in models/ of the subject's folder or of one of the two above it";
-            Error::invalid(source, "model", format!("{name} not found"), expected)
-        })
-    }
 }
 
 fn frames_of(
@@ -265,9 +204,14 @@ fn frames_of(
         let name = frame_name(&listed.file_path);
         Ok(FrameRef {
             name,
+            time: listed.time,
             pose: listed.time,
             camera: listed.camera,
-            source: FrameSource::Files { image, mask },
+            source: FrameSource::Files(FrameFiles {
+                image,
+                mask: mask.map(MaskFile::from),
+                background: None,
+            }),
         })
     };
     listed.into_iter().enumerate().map(frame).collect()

@@ -8,43 +8,57 @@
 //!
 //! | module | formats |
 //! |---|---|
-//! | [`avatar`] | avatars whoever made them: tells the formats apart |
+//! | [`avatar`] | avatars whoever made them: tells the formats apart; the npz of Gaussians, torch and HAHA checkpoints |
 //! | [`ply`] | 3DGS avatars, with their binding in extra properties |
 //! | [`splatting_avatar`] | avatars that SplattingAvatar exports |
-//! | [`body`], [`gltf`] | SMPL-style `.npz`, skinned glTF 2.0 |
-//! | [`poses`] | SMPL-style `.npz` and JSON, glTF clips |
-//! | [`camera`] | camera JSON, `transforms.json`, `cameras.npz` |
+//! | [`body`], [`gltf`] | SMPL, SMPL-H, SMPL-X and their like as `.npz` or `.pkl`, skinned glTF 2.0 |
+//! | [`poses`] | poses and motions: SMPL-style `.npz`, `.pkl` and JSON, AMASS, AIST++, glTF clips |
+//! | [`camera`] | camera JSON, `transforms.json` (also nerfstudio's), `cameras.json` of 3DGS, `cameras.npz` |
 //! | [`frames`] | PNG, JPEG and `.npy` images and masks |
-//! | [`npy`], [`npz`] | NumPy arrays |
+//! | [`masks`] | what the values of masks mean |
+//! | [`npy`], [`npz`], [`pickle`], [`arrays`] | NumPy arrays; Python pickles of them, nothing executed |
+//! | [`hdf5`] | arrays of HDF5 files |
+//! | [`torch`] | tensors of torch checkpoints |
 //! | [`folder`] | a subject as a folder of sequences |
-//! | [`layouts`] | data sets as others store them: PeopleSnapshot as prepared for InstantAvatar |
+//! | [`layouts`] | data sets as others store them: NeuMan, PeopleSnapshot, GalaBasketball, X-Humans |
 //! | [`sequence`] | posed frames with their cameras, decoded when asked for |
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
+pub mod arrays;
 pub mod atomic;
 pub mod avatar;
 pub mod body;
 pub mod camera;
 mod capture;
+pub mod depth;
 mod digest;
 pub mod error;
 pub mod folder;
 pub mod frames;
 pub mod gltf;
+pub mod hdf5;
+mod image_size;
 pub mod key;
 pub mod layouts;
+pub mod listing;
+pub mod masks;
+mod models;
 pub mod npy;
 pub mod npz;
+pub mod pickle;
 pub mod ply;
 pub mod poses;
 mod reduce;
 pub mod select;
 pub mod sequence;
+mod shapes;
 mod sourced;
 pub mod splatting_avatar;
+pub mod torch;
 
 pub use capture::Capture;
 pub use error::Error;
 pub use folder::Subject;
-pub use sequence::{FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
+pub use masks::{MaskFile, MaskReading};
+pub use sequence::{FrameFiles, FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
 pub use sourced::{SourceDigest, Sourced};

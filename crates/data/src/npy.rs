@@ -1,8 +1,7 @@
 //! NumPy `.npy` arrays of numbers, in either byte order and either memory order.
 //!
-//! The header is parsed here and not by the `npyz` crate, which this layer otherwise uses: that one allocates the
-//! header length that a file claims, overflows on the product of an absurd shape and recurses as deep as the header's
-//! brackets nest.
+//! Parsed here and not by the `npyz` crate, which the tests compare with: that one allocates the header length that a file
+//! claims, overflows on the product of an absurd shape and recurses as deep as the header's brackets nest.
 
 use super::{Error, atomic};
 use skinsplat_core::scene::SceneError;
@@ -13,7 +12,7 @@ use std::path::Path;
 /// No array of more values than this is read (1 GiB as `f64`); the largest known body model has 15 million.
 pub const MAX_VALUES: usize = 1 << 27;
 
-const MAGIC: &[u8; 6] = b"\x93NUMPY";
+pub(super) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 const MAX_HEADER: usize = 1 << 16;
 
 /// An array in C order (the last index runs fastest), whatever the order in the file.
@@ -40,8 +39,20 @@ pub struct Header {
 /// # Errors
 /// A file that is not `.npy`, is truncated, or holds another type.
 pub fn read(path: &Path) -> Result<Array, Error> {
+    read_with_header(path).map(|(_, array)| array)
+}
+
+/// As [`read`], with what the header says: the type of the numbers as they are stored.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with_header(path: &Path) -> Result<(Header, Array), Error> {
     let file = File::open(path).map_err(|cause| Error::read(path, "file", "a .npy array", cause))?;
-    read_array(BufReader::new(file), "array").map_err(|e| Error::scene(path, e))
+    let mut reader = BufReader::new(file);
+    let scene = |e: SceneError| Error::scene(path, e);
+    let header = read_header(&mut reader, "array").map_err(scene)?;
+    let array = read_values(reader, &header, "array").map_err(scene)?;
+    Ok((header, array))
 }
 
 /// Writes `f32` values as a little-endian `.npy` file of the given shape.
@@ -65,6 +76,22 @@ pub fn write_f32(path: &Path, shape: &[usize], values: impl IntoIterator<Item = 
 /// Reads an array of numbers; errors name `field`.
 pub(super) fn read_array(mut reader: impl Read, field: &str) -> Result<Array, SceneError> {
     let header = read_header(&mut reader, field)?;
+    read_values(reader, &header, field)
+}
+
+/// The numbers of an array whose elements are `bytes`, in memory order. Bytes beyond its shape are not looked at.
+pub(super) fn from_bytes(
+    descr: &str,
+    shape: &[usize],
+    fortran_order: bool,
+    bytes: &[u8],
+    field: &str,
+) -> Result<Array, SceneError> {
+    read_values(bytes, &Header { descr: descr.to_owned(), shape: shape.to_vec(), fortran_order }, field)
+}
+
+/// The numbers after a header.
+fn read_values(reader: impl Read, header: &Header, field: &str) -> Result<Array, SceneError> {
     let (big_endian, kind, size) = element(&header.descr, field)?;
     let convert: fn(&[u8]) -> f64 = match (kind, size) {
         ('f', 4) => |b| f64::from(f32::from_le_bytes(sized(b))),
@@ -79,7 +106,7 @@ pub(super) fn read_array(mut reader: impl Read, field: &str) -> Result<Array, Sc
         ('u', 8) => |b| u64::from_le_bytes(sized(b)) as f64,
         _ => return Err(type_error(&header.descr, field)),
     };
-    let mut bytes = read_elements(reader, &header, size, field)?;
+    let mut bytes = read_elements(reader, header, size, field)?;
     if big_endian {
         bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
     }
@@ -87,12 +114,30 @@ pub(super) fn read_array(mut reader: impl Read, field: &str) -> Result<Array, Sc
     if header.fortran_order {
         values = to_c_order(&values, &header.shape);
     }
-    Ok(Array { shape: header.shape, values })
+    Ok(Array { shape: header.shape.clone(), values })
 }
 
 /// Reads an array of `U` (UTF-32) or `S` (bytes) strings, flat.
 pub(super) fn read_text(mut reader: impl Read, field: &str) -> Result<Vec<String>, SceneError> {
     let header = read_header(&mut reader, field)?;
+    read_strings(reader, &header, field)
+}
+
+/// As [`from_bytes`], of strings.
+pub(super) fn text_from_bytes(
+    descr: &str,
+    shape: &[usize],
+    bytes: &[u8],
+    field: &str,
+) -> Result<Vec<String>, SceneError> {
+    read_strings(
+        bytes,
+        &Header { descr: descr.to_owned(), shape: shape.to_vec(), fortran_order: false },
+        field,
+    )
+}
+
+fn read_strings(reader: impl Read, header: &Header, field: &str) -> Result<Vec<String>, SceneError> {
     let (big_endian, kind, width) = element(&header.descr, field)?;
     let size = match kind {
         'U' => width.checked_mul(4),
@@ -102,7 +147,7 @@ pub(super) fn read_text(mut reader: impl Read, field: &str) -> Result<Vec<String
     let Some(size) = size.filter(|&s| s > 0) else {
         return Err(SceneError::new(field, format!("type {}", header.descr), "strings (U or S)"));
     };
-    let bytes = read_elements(reader, &header, size, field)?;
+    let bytes = read_elements(reader, header, size, field)?;
     let string = |element: &[u8]| -> String {
         let unit =
             |b: &[u8]| if big_endian { u32::from_be_bytes(sized(b)) } else { u32::from_le_bytes(sized(b)) };

@@ -2,8 +2,8 @@
 
 use super::Error;
 use super::npy::{self, Array, Header};
+use super::shapes::Extents;
 use skinsplat_core::scene::SceneError;
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use zip::ZipArchive;
 pub struct Archive {
     path: PathBuf,
     inner: ZipArchive<BufReader<File>>,
-    extents: BTreeMap<char, usize>,
+    extents: Extents,
 }
 
 impl std::fmt::Debug for Archive {
@@ -34,7 +34,7 @@ impl Archive {
         let open = || ZipArchive::new(BufReader::new(File::open(path)?));
         let inner =
             open().map_err(|cause| Error::read(path, what, "a .npz archive of arrays", cause.into()))?;
-        Ok(Self { path: path.to_owned(), inner, extents: BTreeMap::new() })
+        Ok(Self { path: path.to_owned(), inner, extents: Extents::default() })
     }
 
     /// The file.
@@ -95,12 +95,23 @@ impl Archive {
     /// Another shape, NaN or infinite values.
     pub fn optional(&mut self, name: &str, pattern: &str) -> Result<Option<Array>, Error> {
         let Some(array) = self.array(name)? else { return Ok(None) };
-        self.check_shape(name, &array.shape, pattern)?;
-        if let Some(i) = array.values.iter().position(|v| !v.is_finite()) {
-            let index = array.index_of(i);
-            return Err(self.invalid(format!("{name}{index:?}"), "NaN or infinite", "finite values"));
+        self.extents.check(&self.path, name, array, pattern).map(Some)
+    }
+
+    /// An array whose shape fits one of several patterns, whatever its values are; `None` if there is none of that name.
+    ///
+    /// # Errors
+    /// Another shape (the last pattern is named), broken or truncated data.
+    pub fn any_of(&mut self, name: &str, patterns: &[&str]) -> Result<Option<Array>, Error> {
+        let Some(array) = self.array(name)? else { return Ok(None) };
+        let mut fits = Ok(());
+        for pattern in patterns {
+            fits = self.extents.check_shape(&self.path, name, &array.shape, pattern);
+            if fits.is_ok() {
+                break;
+            }
         }
-        Ok(Some(array))
+        fits.map(|()| Some(array))
     }
 
     /// An error about a field of this archive.
@@ -117,30 +128,6 @@ impl Archive {
         // Names are whatever the archive says: one line in any case.
         let names: Vec<String> = self.names().iter().map(|name| name.escape_debug().to_string()).collect();
         self.invalid(name, format!("missing; the archive holds {}", names.join(", ")), expected)
-    }
-
-    fn check_shape(&mut self, name: &str, shape: &[usize], pattern: &str) -> Result<(), Error> {
-        let tokens: Vec<&str> = pattern.split(',').filter(|t| !t.is_empty()).collect();
-        let mut fits = tokens.len() == shape.len();
-        for (token, &extent) in tokens.iter().zip(shape) {
-            let expected = match (token.parse::<usize>(), token.chars().next()) {
-                (Ok(number), _) => number,
-                (_, Some('*')) => extent,
-                (_, Some(letter)) if fits => *self.extents.entry(letter).or_insert(extent),
-                _ => extent,
-            };
-            fits &= expected == extent;
-        }
-        if fits {
-            return Ok(());
-        }
-        let known: Vec<String> = tokens
-            .iter()
-            .filter_map(|t| t.chars().next())
-            .filter_map(|letter| Some(format!("{letter} = {}", self.extents.get(&letter)?)))
-            .collect();
-        let known = if known.is_empty() { String::new() } else { format!(" with {}", known.join(", ")) };
-        Err(self.invalid(name, format!("shape {shape:?}"), format!("({pattern}){known}")))
     }
 
     fn entry<T>(
@@ -161,23 +148,4 @@ const SUFFIX: &str = ".npy";
 
 fn file_name(array: &str) -> String {
     format!("{array}{SUFFIX}")
-}
-
-impl Array {
-    /// The index of the value at flat position `i`.
-    fn index_of(&self, i: usize) -> Vec<usize> {
-        let mut rest = i;
-        let mut index: Vec<usize> = self
-            .shape
-            .iter()
-            .rev()
-            .map(|&n| {
-                let k = rest % n;
-                rest /= n;
-                k
-            })
-            .collect();
-        index.reverse();
-        index
-    }
 }

@@ -1,10 +1,11 @@
 //! A sequence of posed frames: everything an evaluation needs, with images decoded only when asked for.
 
+use super::masks::MaskFile;
 use super::{Error, Sourced, digest, frames, reduce};
 use rayon::prelude::*;
 use skinsplat_core::scene::{Camera, Image, Mask, Pose, RestBody};
 use std::fmt::Debug;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 /// Frames of one subject.
@@ -29,6 +30,8 @@ pub struct Sequence {
 pub struct FrameRef {
     /// The image's own name ("cam00/image_0004"), unique in its sequence.
     pub name: String,
+    /// Point in time, as the data numbers them: what the ranges of a split count.
+    pub time: usize,
     /// Index into [`Sequence::poses`].
     pub pose: usize,
     /// Index into [`Sequence::cameras`].
@@ -40,38 +43,68 @@ pub struct FrameRef {
 /// Where the truth of a frame comes from.
 #[derive(Clone, Debug)]
 pub enum FrameSource {
-    /// Files, decoded when asked for. Without a mask file, the image's alpha channel is the mask.
-    Files {
-        /// The image.
-        image: PathBuf,
-        /// Its mask.
-        mask: Option<PathBuf>,
-    },
-    /// Rendered when asked for.
+    /// Files, decoded when asked for.
+    Files(FrameFiles),
+    /// Made when asked for: rendered, or computed from files that are no image each.
     Generated {
-        /// What renders it.
+        /// What makes it.
         generator: Arc<dyn FrameGenerator>,
         /// Which of the generator's frames it is.
         frame: usize,
     },
 }
 
-/// Something that makes true frames in-process.
+/// The files of a frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameFiles {
+    /// The image.
+    pub image: PathBuf,
+    /// Its mask; without one, the image's alpha channel is the mask.
+    pub mask: Option<MaskFile>,
+    /// What the camera sees without the subject. An image that has one keeps it, and renders are drawn over it.
+    pub background: Option<PathBuf>,
+}
+
+/// Something that makes true frames: a renderer, or a reader of files that are no image each.
 pub trait FrameGenerator: Send + Sync + Debug {
     /// The truth of a frame; the same bits at every call.
-    fn truth(&self, frame: usize) -> Truth;
+    ///
+    /// # Errors
+    /// If it is made from files that cannot be read.
+    fn truth(&self, frame: usize) -> Result<Truth, Error>;
 
     /// A text that changes whenever any frame would.
-    fn key(&self) -> String;
+    ///
+    /// # Errors
+    /// As [`FrameGenerator::truth`].
+    fn key(&self) -> Result<String, Error>;
 }
 
 /// A true image: straight (un-premultiplied) colour, and how much of each pixel the subject covers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Truth {
-    /// Colour, sRGB values.
+    /// Colour, sRGB values. Where the background was captured too, the whole picture.
     pub rgb: Image,
     /// Coverage in \[0, 1\].
     pub alpha: Mask,
+    /// What the camera sees without the subject, if that was captured.
+    pub background: Option<Image>,
+}
+
+impl Truth {
+    /// A truth without a captured background.
+    pub fn new(rgb: Image, alpha: Mask) -> Self {
+        Self { rgb, alpha, background: None }
+    }
+
+    /// The truth at another, not larger, width and height, by area averages.
+    pub fn reduced(self, [width, height]: [u32; 2]) -> Self {
+        let (width, height) = (width as usize, height as usize);
+        match (self.rgb.width(), self.rgb.height()) == (width, height) {
+            true => self,
+            false => reduce::reduced(&self, width, height),
+        }
+    }
 }
 
 /// True images that were loaded before.
@@ -83,12 +116,12 @@ struct Held {
 }
 
 impl FrameGenerator for Held {
-    fn truth(&self, frame: usize) -> Truth {
-        self.truths[frame].clone()
+    fn truth(&self, frame: usize) -> Result<Truth, Error> {
+        Ok(self.truths[frame].clone())
     }
 
-    fn key(&self) -> String {
-        self.key.get_or_init(|| format!("in memory {}", digest::of_truths(&self.truths))).clone()
+    fn key(&self) -> Result<String, Error> {
+        Ok(self.key.get_or_init(|| format!("in memory {}", digest::of_truths(&self.truths))).clone())
     }
 }
 
@@ -158,42 +191,53 @@ impl Sequence {
             return Err(Error::invalid(&self.id, "frame", frame.to_string(), expected));
         };
         let wanted = &self.cameras[*camera];
-        let stored = self.stored_sizes.as_ref().map_or([wanted.width, wanted.height], |sizes| sizes[*camera]);
-        let truth = self.stored_truth(source, stored)?;
-        if stored == [wanted.width, wanted.height] {
-            return Ok(truth);
-        }
-        Ok(reduce::reduced(&truth, wanted.width as usize, wanted.height as usize))
+        let stored = self.stored_size(*camera);
+        Ok(self.stored_truth(source, stored)?.reduced([wanted.width, wanted.height]))
+    }
+
+    /// Width and height of the images of a camera as they are stored.
+    pub fn stored_size(&self, camera: usize) -> [u32; 2] {
+        let seen = || [self.cameras[camera].width, self.cameras[camera].height];
+        self.stored_sizes.as_ref().map_or_else(seen, |sizes| sizes[camera])
     }
 
     /// A true image at the size at which it is stored.
     fn stored_truth(&self, source: &FrameSource, [width, height]: [u32; 2]) -> Result<Truth, Error> {
         match source {
-            FrameSource::Generated { generator, frame } => Ok(generator.truth(*frame)),
-            FrameSource::Files { image, mask } => {
-                let size = (width as usize, height as usize);
-                let (rgb, own_alpha) = frames::load_image(image)?;
-                check_size(image, "image", (rgb.width(), rgb.height()), size)?;
-                let alpha = match mask {
-                    Some(path) => {
-                        let mask = frames::load_mask(path)?;
-                        check_size(path, "mask", (mask.width(), mask.height()), size)?;
-                        mask
-                    }
-                    None => own_alpha.unwrap_or_else(|| Mask::filled(size.0, size.1, 1.0)),
-                };
-                Ok(Truth { rgb, alpha })
-            }
+            FrameSource::Generated { generator, frame } => generator.truth(*frame),
+            FrameSource::Files(files) => files.truth((width as usize, height as usize)),
         }
     }
 }
 
-fn check_size(
-    path: &std::path::Path,
-    field: &str,
-    found: (usize, usize),
-    camera: (usize, usize),
-) -> Result<(), Error> {
+impl FrameFiles {
+    fn truth(&self, size: (usize, usize)) -> Result<Truth, Error> {
+        let (rgb, own_alpha) = frames::load_image(&self.image)?;
+        check_size(&self.image, "image", (rgb.width(), rgb.height()), size)?;
+        let alpha = match &self.mask {
+            Some(file) => {
+                let mask = file.load(&rgb)?;
+                check_size(&file.path, "mask", (mask.width(), mask.height()), size)?;
+                mask
+            }
+            None => own_alpha.unwrap_or_else(|| Mask::filled(size.0, size.1, 1.0)),
+        };
+        let background = self.background.as_ref().map(|path| {
+            let (image, _) = frames::load_image(path)?;
+            check_size(path, "background", (image.width(), image.height()), size)?;
+            Ok::<_, Error>(image)
+        });
+        Ok(Truth { rgb, alpha, background: background.transpose()? })
+    }
+
+    /// Every file, the image first.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        let mask = self.mask.as_ref().map(|mask| mask.path.as_path());
+        std::iter::once(self.image.as_path()).chain(mask).chain(self.background.as_deref())
+    }
+}
+
+fn check_size(path: &Path, field: &str, found: (usize, usize), camera: (usize, usize)) -> Result<(), Error> {
     if found == camera {
         return Ok(());
     }

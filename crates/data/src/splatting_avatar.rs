@@ -9,7 +9,7 @@ use glam::DVec3;
 use serde::Deserialize;
 use skinsplat_core::scene::body::vertex_normals;
 use skinsplat_core::scene::{Avatar, Binding, FaceBinding};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Name of the file of the Gaussians.
 pub const GAUSSIANS: &str = "point_cloud.ply";
@@ -35,10 +35,13 @@ pub struct Exported {
     pub files: Vec<PathBuf>,
 }
 
+/// Later files of the same program call the mesh `mesh_fn` and the coordinates `_sample_bary`.
 #[derive(Deserialize)]
 struct Embedding {
+    #[serde(alias = "mesh_fn")]
     cano_mesh: String,
     sample_fidxs: Vec<u32>,
+    #[serde(alias = "_sample_bary")]
     sample_bary: Vec<[f32; 3]>,
     #[serde(rename = "_xyz")]
     xyz: Vec<[f32; 3]>,
@@ -70,8 +73,7 @@ pub fn load(point_cloud: &Path) -> Result<Exported, Error> {
             format!("{n} (Gaussians of the PLY)"),
         ));
     }
-    let mesh_name = Path::new(&embedding.cano_mesh).file_name().unwrap_or("embedding.obj".as_ref());
-    let mesh = path.with_file_name(mesh_name);
+    let mesh = mesh_file(&path, &embedding.cano_mesh);
     let (vertices, faces) = read_obj(&mesh)?;
     let normals = vertex_normals(&vertices, &faces);
     for i in 0..n {
@@ -98,6 +100,19 @@ pub fn load(point_cloud: &Path) -> Result<Exported, Error> {
     });
     avatar.validate(None).map_err(|e| Error::scene(&path, e))?;
     Ok(Exported { avatar, vertices, faces, files: vec![point_cloud.to_owned(), path, mesh] })
+}
+
+/// The file of the canonical mesh: where a relative name leads from the embedding on, without leaving its folder; else the
+/// file of that name beside it, since absolute names are those of another machine.
+fn mesh_file(embedding: &Path, name: &str) -> PathBuf {
+    let stays =
+        Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    let below = embedding.with_file_name(name);
+    if stays && below.is_file() {
+        return below;
+    }
+    let last = name.rsplit(['/', '\\']).next().filter(|last| !last.is_empty() && *last != "..");
+    embedding.with_file_name(last.unwrap_or("embedding.obj"))
 }
 
 /// Vertices and triangles of a Wavefront OBJ file; everything else in it is skipped.

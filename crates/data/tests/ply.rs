@@ -27,8 +27,11 @@ fn gaussians(n: usize) -> impl Strategy<Value = Gaussians> {
     use prop::collection::vec;
     (0usize..4).prop_flat_map(move |sh_degree| {
         let sh = vec([finite(), finite(), finite()], n * (sh_degree + 1).pow(2));
-        let scales = vec([-20f32..5.0, -20f32..5.0, -20f32..5.0].prop_map(Vec3::from_array), n);
-        (vec(vec3(), n), vec(rotation(), n), scales, vec(finite(), n), sh).prop_map(
+        let scale = || prop_oneof![9 => -20f32..5.0, 1 => Just(f32::NEG_INFINITY)];
+        let scales = vec([scale(), scale(), scale()].prop_map(Vec3::from_array), n);
+        let infinite = prop_oneof![Just(f32::INFINITY), Just(f32::NEG_INFINITY)];
+        let opacity = prop_oneof![9 => finite(), 1 => infinite];
+        (vec(vec3(), n), vec(rotation(), n), scales, vec(opacity, n), sh).prop_map(
             move |(means, rotations, log_scales, opacity_logits, sh)| Gaussians {
                 means,
                 rotations,
@@ -148,7 +151,7 @@ fn big_endian_doubles_unknown_properties_and_other_elements_are_read() {
     std::fs::write(&path, bytes).unwrap();
     let stored = ply::read(&path).unwrap();
     assert_eq!((stored.avatar, stored.encoding), (avatar, Encoding::BigEndian));
-    assert_eq!(stored.ignored, ["label"]);
+    assert_eq!(stored.ignored, ["label", "element camera", "element face"]);
 }
 
 #[test]
@@ -177,7 +180,8 @@ fn what_is_wrong_is_named() {
         (vertex.replace("f_dc_1", "green"), "f_dc_1"),
         (vertex.replace("\n1 2 3 ", "\n1 NaN 3 "), "x, y, z[0]"),
         (vertex.replace("\n1 2 3 ", "\n1 two 3 "), "y[0]"),
-        (vertex.replace(" 0.25 -4 ", " inf -4 "), "opacity[0]"),
+        (vertex.replace(" 0.25 -4 ", " nan -4 "), "opacity[0]"),
+        (vertex.replace(" -4 ", " inf "), "scale[0]"),
         (vertex.replace(" -4 ", " 400 "), "scale[0]"),
         (vertex.replace(" 0.5 -0.5 0.5 0.5 ", " 0 0 0 0 "), "rot[0]"),
         (vertex.replace(" 3.3 ", " NaN "), "f_dc/f_rest[0]"),
@@ -199,6 +203,107 @@ fn what_is_wrong_is_named() {
         let error = ply::read(&path).unwrap_err();
         assert_eq!((error.field(), error.path()), (*field, path.as_path()), "case {i}: {error}");
     }
+}
+
+#[test]
+fn comments_are_free_text_and_names_are_not_read_as_text() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = ascii(folder.path(), &one_gaussian(Binding::Static));
+    let path = folder.path().join("gbk.ply");
+    let write = |comment: &[u8]| {
+        let (first, rest) = text.split_once('\n').unwrap();
+        std::fs::write(&path, [first.as_bytes(), b"\ncomment ", comment, b"\n", rest.as_bytes()].concat())
+            .unwrap();
+    };
+    write(b"\xc4\xe3\xba\xc3 D:/\xcd\xbc");
+    let stored = ply::read(&path).unwrap();
+    assert!(
+        stored.comments[0].contains('\u{fffd}') && stored.comments[0].contains("D:/"),
+        "{:?}",
+        stored.comments
+    );
+    write("élan vital".as_bytes());
+    assert_eq!(ply::read(&path).unwrap().comments[0], "élan vital");
+    std::fs::write(
+        &path,
+        b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float \xff\xfe\x1b[31m\nend_header\n1\n",
+    )
+    .unwrap();
+    assert_eq!(ply::read(&path).unwrap_err().field(), "x");
+}
+
+/// A header is at most a megabyte, and its reader's time grows with it.
+#[test]
+fn long_headers_are_refused_in_no_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = std::time::Instant::now();
+    let properties: String = (0..45_000).map(|k| format!("property float f_rest_{k}\n")).collect();
+    let elements: String = (0..45_000).map(|k| format!("element e{k} 0\n")).collect();
+    let comments = "comment x\n".repeat(200_000);
+    let cases = [
+        (format!("element vertex 1\n{properties}"), "element vertex"),
+        (elements, "header"),
+        (comments, "header"),
+        (format!("element vertex 1\nproperty list uchar {}int x\n", "int ".repeat(100_000)), "header"),
+    ];
+    for (lines, field) in cases {
+        let path = folder.path().join("long.ply");
+        std::fs::write(&path, format!("ply\nformat ascii 1.0\n{lines}end_header\n")).unwrap();
+        let error = ply::read(&path).unwrap_err();
+        assert_eq!(error.field(), field, "{error}");
+        assert!(error.to_string().len() < 400, "{error}");
+    }
+    assert!(start.elapsed().as_secs_f64() < 2.0, "{:?}", start.elapsed());
+}
+
+/// Lists before the vertices are walked over, and the walk ends with the file.
+#[test]
+fn lists_that_claim_more_than_the_file_holds_are_truncated_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lists.ply");
+    let header = |rows: u64| {
+        format!(
+            "ply\nformat binary_little_endian 1.0\nelement face {rows}\nproperty list int int v\n\
+             element vertex 1\nproperty float x\nend_header\n"
+        )
+    };
+    for (rows, body) in [(1, &[0xff, 0xff, 0xff, 0x7f][..]), (u64::MAX, &[0; 8]), (2, &[0, 0, 0, 0, 1, 0])] {
+        std::fs::write(&path, [header(rows).as_bytes(), body].concat()).unwrap();
+        let error = ply::read(&path).unwrap_err();
+        assert_eq!(error.field(), "element face", "{error}");
+    }
+    std::fs::write(&path, [header(1).as_bytes(), &[0xff; 4], &[0; 4]].concat()).unwrap();
+    assert_eq!(ply::read(&path).unwrap_err().field(), "y", "a negative count holds nothing");
+}
+
+#[test]
+fn weights_that_nearly_sum_to_one_are_divided_by_their_sum() {
+    let folder = tempfile::tempdir().unwrap();
+    let weights = SkinWeights::from_rows([[(3, 0.25), (1, 0.75)]], 4).unwrap();
+    let text = ascii(folder.path(), &one_gaussian(Binding::Vertex(weights)));
+    let path = folder.path().join("sum.ply");
+    std::fs::write(&path, text.replace(" 0.25 0.75", " 0.24 0.74")).unwrap();
+    let stored = ply::read(&path).unwrap();
+    let Binding::Vertex(weights) = &stored.avatar.binding else { panic!() };
+    let (joints, weights) = weights.row(0);
+    assert_eq!(joints, [3, 1]);
+    assert!(
+        (weights[0] - 0.24 / 0.98).abs() < 1e-6 && (weights[1] - 0.74 / 0.98).abs() < 1e-6,
+        "{weights:?}"
+    );
+    assert!(stored.notes[0].contains("1 of 1 rows summed to 0.98"), "{:?}", stored.notes);
+}
+
+#[test]
+fn two_scales_are_a_disc_and_comments_name_the_rasterizer() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = ascii(folder.path(), &one_gaussian(Binding::Static));
+    let path = folder.path().join("2dgs.ply");
+    let text = text.replace("property float scale_2\n", "").replace("0.25 -4 -4 -4 ", "0.25 -4 -4 ");
+    std::fs::write(&path, text.replace("end_header", "comment SplatRenderMode: mip\nend_header")).unwrap();
+    let stored = ply::read(&path).unwrap();
+    assert_eq!(stored.avatar.gaussians.log_scales[0], Vec3::new(-4.0, -4.0, f32::NEG_INFINITY));
+    assert_eq!(stored.notes.len(), 2, "{:?}", stored.notes);
 }
 
 #[test]

@@ -58,13 +58,13 @@ fn bend(body: &RestBody, degrees: f64) -> Pose {
 struct Masks(Vec<Mask>);
 
 impl FrameGenerator for Masks {
-    fn truth(&self, frame: usize) -> Truth {
+    fn truth(&self, frame: usize) -> Result<Truth, skinsplat_data::Error> {
         let alpha = self.0[frame].clone();
-        Truth { rgb: Image::filled(alpha.width(), alpha.height(), [0.5; 3]), alpha }
+        Ok(Truth::new(Image::filled(alpha.width(), alpha.height(), [0.5; 3]), alpha))
     }
 
-    fn key(&self) -> String {
-        "masks".into()
+    fn key(&self) -> Result<String, skinsplat_data::Error> {
+        Ok("masks".into())
     }
 }
 
@@ -90,6 +90,7 @@ fn sequence(body: &RestBody, truth: &RestBody, directions: &[f64], bends: &[f64]
     let generator = Arc::new(Masks(masks));
     let frame = |(k, &(pose, camera)): (usize, &(usize, usize))| FrameRef {
         name: format!("image_{k:04}"),
+        time: pose,
         pose,
         camera,
         source: FrameSource::Generated { generator: generator.clone(), frame: k },

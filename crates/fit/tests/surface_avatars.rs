@@ -82,17 +82,17 @@ struct Studio {
 }
 
 impl FrameGenerator for Studio {
-    fn truth(&self, frame: usize) -> Truth {
+    fn truth(&self, frame: usize) -> Result<Truth, skinsplat_data::Error> {
         let camera = &self.cameras[frame];
         let vertices: Vec<Vec3> = self.body.vertices.iter().map(|v| v.as_vec3()).collect();
         let mesh = Mesh::new(&vertices, &self.body.faces).unwrap();
         let eye = camera.position().as_vec3();
         let drawing = draw(&mesh, camera, SamplePattern::new(4), |f| (self.shade)(f, eye)).unwrap();
-        Truth { rgb: drawing.colour, alpha: drawing.coverage }
+        Ok(Truth::new(drawing.colour, drawing.coverage))
     }
 
-    fn key(&self) -> String {
-        "sphere".into()
+    fn key(&self) -> Result<String, skinsplat_data::Error> {
+        Ok("sphere".into())
     }
 }
 
@@ -109,6 +109,7 @@ fn sequence(body: &RestBody, truth: RestBody, cameras: Vec<Camera>, shade: Shade
     let studio = Arc::new(Studio { body: truth, cameras: cameras.clone(), shade });
     let frame = |k: usize| FrameRef {
         name: format!("image_{k:04}"),
+        time: 0,
         pose: 0,
         camera: k,
         source: FrameSource::Generated { generator: studio.clone(), frame: k },

@@ -62,6 +62,8 @@ pub enum MetricsError {
         region: &'static str,
         /// Mask values from here on are inside.
         threshold: f32,
+        /// The mask's largest value.
+        largest: f32,
     },
     /// No pixel of the mask has a window that fits into the image.
     NoCoveredPixel {
@@ -132,9 +134,9 @@ impl fmt::Display for MetricsError {
                 format!("at least {minimum}x{minimum}"),
             ),
             Self::NoMask { region } => ("mask", "none given".into(), format!("one, for region \"{region}\"")),
-            Self::EmptyRegion { region, threshold } => (
+            Self::EmptyRegion { region, threshold, largest } => (
                 "mask",
-                format!("region \"{region}\" holds no pixel"),
+                format!("region \"{region}\" holds no pixel, the largest value is {largest}"),
                 format!("at least one value of {threshold} or more"),
             ),
             Self::NoCoveredPixel { metric } => (

@@ -170,16 +170,16 @@ impl Protocol {
     /// Checks the numbers of a protocol that was read from a file.
     ///
     /// # Errors
-    /// An empty id, a version of 0, a background that is not finite, a threshold outside (0, 1].
+    /// An empty id, a version of 0, a background outside \[0, 1\], a threshold outside (0, 1].
     pub fn check(&self) -> Result<(), MetricsError> {
-        let finite = match self.background {
-            Background::Colour(colour) => colour.iter().all(|v| v.is_finite()),
+        let in_range = match self.background {
+            Background::Colour(colour) => colour.iter().all(|v| (0.0..=1.0).contains(v)),
             Background::Captured(_) => true,
         };
         let wrong = [
             (self.id.is_empty(), "id: empty", "a name"),
             (self.version == 0, "version: 0", "at least 1"),
-            (!finite, "background: NaN or infinite", "three finite numbers or \"captured\""),
+            (!in_range, "background: out of range", "three numbers in [0, 1] or \"captured\""),
             (
                 !(self.mask_threshold > 0.0 && self.mask_threshold <= 1.0),
                 "mask_threshold: out of range",

@@ -79,11 +79,17 @@ pub(crate) fn bounding_box(mask: &Mask, threshold: f32, exclusive: bool) -> Opti
     (rect.x.start < rect.x.end && rect.y.start < rect.y.end).then_some(rect)
 }
 
+/// The error of a mask without a pixel inside.
+pub(crate) fn empty(mask: &Mask, threshold: f32, region: Region) -> MetricsError {
+    let largest = mask.values().iter().fold(0.0_f32, |largest, &v| largest.max(v));
+    MetricsError::EmptyRegion { region: region.id(), threshold, largest }
+}
+
 /// The mask as weights: 1 inside, 0 outside. An error if nothing is inside.
 pub(crate) fn inside(mask: &Mask, threshold: f32, region: Region) -> Result<Vec<f64>, MetricsError> {
     let weights: Vec<f64> = mask.values().iter().map(|&v| f64::from(u8::from(v >= threshold))).collect();
     if weights.contains(&1.0) {
         return Ok(weights);
     }
-    Err(MetricsError::EmptyRegion { region: region.id(), threshold })
+    Err(empty(mask, threshold, region))
 }

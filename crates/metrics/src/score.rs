@@ -1,7 +1,7 @@
 //! One frame under a protocol.
 
 use super::planes::{check_mask, exact_level};
-use super::region::{bounding_box, inside};
+use super::region::{bounding_box, empty, inside};
 use super::{
     AvatarStats, Background, ErrorSums, FrameInput, Measure, Measured, MetricId, MetricsError,
     PerceptualDistance, Planes, Protocol, ProtocolId, Region, Values,
@@ -217,8 +217,8 @@ impl Protocol {
     fn cut(&self, render: Planes, truth: Planes, mask: Option<&Mask>) -> Result<Prepared, MetricsError> {
         let (region, threshold) = (self.region, self.mask_threshold);
         let crop = |mask: &Mask, exclusive: bool| {
-            let empty = MetricsError::EmptyRegion { region: region.id(), threshold };
-            let rect = bounding_box(mask, threshold, exclusive).ok_or(empty)?;
+            let empty = || empty(mask, threshold, region);
+            let rect = bounding_box(mask, threshold, exclusive).ok_or_else(empty)?;
             Ok(Prepared { render: render.crop(&rect), truth: truth.crop(&rect), weights: None })
         };
         match (region, mask) {

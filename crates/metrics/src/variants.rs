@@ -38,8 +38,8 @@ pub type VariantScore = (&'static str, Result<f64, MetricsError>);
 /// is 0.5 and above). Nothing is clamped or quantised. A PSNR of identical images is +inf.
 ///
 /// # Errors
-/// Images or a mask of different sizes, values that are not finite, an empty mask. A variant that an image is too small
-/// for is an error of its own in the list.
+/// Images or a mask of different sizes, values that are not finite. A variant that an image is too small for, or the mask
+/// too empty, is an error of its own in the list.
 pub fn all_variants(
     render: &Image,
     truth: &Image,
@@ -58,7 +58,13 @@ pub fn all_variants(
             mask_threshold: 0.5,
             ..Protocol::default()
         };
-        let pair = protocol.prepare(render, Truth::Composited { rgb: truth, mask })?;
+        let pair = match protocol.prepare(render, Truth::Composited { rgb: truth, mask }) {
+            Err(empty @ MetricsError::EmptyRegion { .. }) => {
+                scores.extend(ids.map(|id| (id, Err(empty.clone()))));
+                continue;
+            }
+            pair => pair?,
+        };
         let weights = pair.weights.as_deref();
         let sums = ErrorSums::new(&pair.render, &pair.truth, weights)?;
         let mse = sums.channel_mse();

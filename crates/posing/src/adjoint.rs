@@ -27,7 +27,17 @@ pub(super) fn add(
     let parts = Part::split(gradient, frame.bound.sh_count());
     parts.into_par_iter().enumerate().for_each(|(number, gradient)| {
         let start = number * CHUNK;
-        AdjointChunk { frame, gaussians, upstream, number, start, gradient, relative: Vec::new() }.run();
+        AdjointChunk {
+            frame,
+            gaussians,
+            upstream,
+            number,
+            start,
+            gradient,
+            relative: Vec::new(),
+            growth: Vec::new(),
+        }
+        .run();
     });
     Ok(())
 }
@@ -103,6 +113,8 @@ struct AdjointChunk<'f, 'a, 'o> {
     gradient: Part<'o>,
     /// R of each Gaussian, for the SH; empty if they stay.
     relative: Vec<Quaternion<f32>>,
+    /// By how much each Gaussian grows; empty unless joints scale and offsets follow.
+    growth: Vec<f32>,
 }
 
 impl AdjointChunk<'_, '_, '_> {
@@ -111,6 +123,9 @@ impl AdjointChunk<'_, '_, '_> {
         let frame = self.frame;
         if self.rotates_sh() {
             self.relative.resize(self.gradient.means.len(), [0.0; 4]);
+        }
+        if frame.offsets_grow() {
+            self.growth.resize(self.gradient.means.len(), 1.0);
         }
         let chunk = &frame.bound.chunks(frame.strategy.covariance)[self.number];
         frame.walk(chunk, self.start, &mut self);
@@ -135,7 +150,11 @@ impl AdjointChunk<'_, '_, '_> {
             let (embedding, of_mean) = (&surface.embeddings[gaussian], self.upstream.means[gaussian]);
             let (of_barycentric, of_offset) = match self.frame.face_motion(gaussian) {
                 Some(motion) => embedding.point_adjoint(&surface.faces.mesh, motion.adjoint(of_mean)),
-                None => embedding.point_adjoint(mesh, of_mean),
+                None => {
+                    let growth = self.growth.get(i).copied().unwrap_or(1.0);
+                    let (of_barycentric, of_offset) = embedding.grown(growth).point_adjoint(mesh, of_mean);
+                    (of_barycentric, of_offset * growth)
+                }
             };
             barycentric.iter_mut().zip(of_barycentric).for_each(|(sum, own)| *sum += own);
             *offset += of_offset;
@@ -193,7 +212,7 @@ impl AdjointChunk<'_, '_, '_> {
         }
         match (self.frame.bound.moves, &rotated.means) {
             (Moves::Not | Moves::WithFaces, _) => gathered,
-            (Moves::ByWeights, Some(_)) => means_adjoint(rotated, &gathered),
+            (Moves::ByWeights, Some(_)) => means_adjoint(input, rotated, &gathered),
             (Moves::ByWeights, None) => {
                 let mut means = input.blend.transform_adjoint(&gathered);
                 if self.frame.source.scaled_faces().is_some() {
@@ -325,6 +344,11 @@ impl Visitor for AdjointChunk<'_, '_, '_> {
         let stored = self.of_stored(input, units, &rotations);
         let means = self.of_means(input, rotated);
         self.add(block, &means, &stored, &log_scales);
+        if let (false, Some(growth)) = (self.growth.is_empty(), input.growth()) {
+            for lane in 0..block.count {
+                self.growth[usize::from(block.index[lane])] = growth[lane];
+            }
+        }
         if !self.relative.is_empty() {
             for lane in 0..block.count {
                 self.relative[usize::from(block.index[lane])] = take(&rotated.relative, lane);

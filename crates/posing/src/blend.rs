@@ -92,6 +92,22 @@ pub(super) fn rotations(matrices: &[Matrix3<f32>], indices: &[u16], weights: &[L
     sum
 }
 
+/// Σ w_j s_j, the growth of each lane; 1 for Gaussians without joints.
+#[inline(never)]
+pub(super) fn growth(scales: &[f32], indices: &[u16], weights: &[Lanes]) -> Lanes {
+    if indices.is_empty() {
+        return [1.0; LANES];
+    }
+    let mut sum = [0.0; LANES];
+    for (&joint, weight) in indices.iter().zip(weights) {
+        let scale = scales[usize::from(joint)];
+        for lane in 0..LANES {
+            sum[lane] += weight[lane] * scale;
+        }
+    }
+    sum
+}
+
 #[inline(always)]
 fn add(sum: &mut [Lanes; 9], matrix: &Matrix3<f32>, weight: &Lanes) {
     for (sum, &entry) in sum.iter_mut().zip(matrix.as_flattened()) {

@@ -23,7 +23,7 @@ pub(super) struct Frame<'a> {
     pub(super) bound: &'a BoundAvatar,
     pub(super) body: &'a PosedBody<'a>,
     pub(super) strategy: &'a Strategy,
-    joints: Joints,
+    pub(super) joints: Joints,
     pub(super) source: Source<'a>,
     /// That of the only camera that will look, if what it does not see may be left out.
     frustum: Option<Frustum>,
@@ -78,13 +78,19 @@ impl<'a> Frame<'a> {
     /// size.
     fn frustum_of(&self, camera: &Camera) -> Option<Frustum> {
         let follows_weights = self.bound.moves == Moves::ByWeights && !self.source.moves_means();
-        let keeps_size = self.strategy.covariance == CovarianceChoice::Rotate && !self.source.is_raw();
+        let rotates = self.strategy.covariance == CovarianceChoice::Rotate && !self.source.is_raw();
+        let keeps_size = rotates && self.joints.scale.is_none();
         (follows_weights && keeps_size).then(|| Frustum::new(camera))
     }
 
     /// Visits the blocks of a chunk, whose first Gaussian has index `start`, with the instructions of this processor.
     pub(super) fn walk(&self, chunk: &Chunk, start: usize, visitor: &mut impl Visitor) {
         self.arch.dispatch(Walk { frame: self, chunk, start, visitor });
+    }
+
+    /// True if Gaussians on faces stand off further where joints scale.
+    pub(super) fn offsets_grow(&self) -> bool {
+        self.bound.moves == Moves::WithFaces && self.joints.scale.is_some()
     }
 
     /// How the mean of a Gaussian moves under HAHA's scaled frames; `None` under other strategies, for static Gaussians
@@ -155,11 +161,26 @@ impl<V: Visitor> pulp::WithSimd for Walk<'_, '_, V> {
                 continue;
             }
             let rotated = rotate(frame.arch, &frame.source, &input);
-            let scales =
-                if frame.source.scaled_faces().is_some() { frame.grown(&input) } else { block.scales };
+            let scales = match (frame.source.scaled_faces(), &frame.joints.scale) {
+                (Some(_), _) => frame.grown(&input),
+                (None, Some(_)) if frame.strategy.covariance.keeps_shape() => grown_with_joints(&input),
+                (None, _) => block.scales,
+            };
             visitor.block(position, &input, &rotated, &scales);
         }
     }
+}
+
+/// The scales of a block whose joints scale.
+#[inline(never)]
+fn grown_with_joints(input: &BlockInput<'_>) -> [Lanes; 3] {
+    let mut scales = input.block.scales;
+    if let Some(growth) = input.growth() {
+        for lane in 0..LANES {
+            scales.iter_mut().for_each(|axis| axis[lane] *= growth[lane]);
+        }
+    }
+    scales
 }
 
 /// That there is a unit quaternion for each of n Gaussians.

@@ -1,14 +1,24 @@
 //! The motion of the joints in one pose, as the kernels read it.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 use skinsplat_core::math::dual_quaternion::DualQuaternion;
+use skinsplat_core::math::portable;
 use skinsplat_core::math::rotation::SignPolicy;
 use skinsplat_core::math::{Matrix3, Quaternion};
-use skinsplat_core::scene::PosedBody;
+use skinsplat_core::scene::{JointTransform, PosedBody};
 
 /// How far the entries of a joint's linear part may be from its rotation's to count as rigid: what f32 quaternions of a
 /// file leave.
 const RIGID: f64 = 1e-6;
+
+/// How far a joint's size may be from 1 to count as 1: the scales of exported bones are off by their rounding.
+const SCALE_NOISE: f64 = 1e-5;
+
+/// What is left of a joint that is scaled to nothing.
+const LEAST_SCALE: f64 = 1e-6;
+
+/// How far the squares of a joint's three factors may be from one another to count as one, relative to their mean.
+const SHEARED: f64 = 1e-3;
 
 /// One entry per joint.
 pub(super) struct Joints {
@@ -24,6 +34,35 @@ pub(super) struct Joints {
     pub(super) rotation_f64: Vec<Quaternion<f64>>,
     /// Rotation and translation (scale left out).
     pub(super) motion: Vec<DualQuaternion<f32>>,
+    /// By how much Gaussians grow on each joint; `None` if none of them scales.
+    pub(super) scale: Option<Vec<f32>>,
+}
+
+/// The joints' sizes: a uniform scale where there is one, else the geometric mean of the three.
+fn scales(joints: &[JointTransform]) -> Option<Vec<f32>> {
+    let scales: Vec<f32> = joints.iter().map(|joint| scale(joint.linear) as f32).collect();
+    scales.iter().any(|s| *s != 1.0).then_some(scales)
+}
+
+/// A joint that is scaled to nothing leaves a millionth, of which there is a logarithm; one that is flattened leaves sizes
+/// alone.
+fn scale(linear: DMat3) -> f64 {
+    let size = portable::cbrt(linear.determinant().abs());
+    if (size - 1.0).abs() <= SCALE_NOISE {
+        return 1.0;
+    }
+    let vanishes = linear.to_cols_array().iter().all(|v| v.abs() <= LEAST_SCALE);
+    if size < LEAST_SCALE && !vanishes { 1.0 } else { size.max(LEAST_SCALE) }
+}
+
+/// The first joint whose linear part is no rotation times one factor.
+pub(super) fn first_sheared(joints: &[JointTransform]) -> Option<usize> {
+    let sheared = |joint: &JointTransform| {
+        let gram = joint.linear.transpose() * joint.linear;
+        let square = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;
+        !gram.abs_diff_eq(DMat3::from_diagonal(DVec3::splat(square)), SHEARED * square.max(f64::MIN_POSITIVE))
+    };
+    joints.iter().position(sheared)
 }
 
 impl Joints {
@@ -47,6 +86,7 @@ impl Joints {
             rotation,
             rotation_f64,
             motion,
+            scale: if rigid { None } else { scales(joints) },
         }
     }
 

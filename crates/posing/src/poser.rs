@@ -47,7 +47,9 @@ impl Poser {
     ///
     /// Means: Eq. 6 (LBS) for Gaussians with weights of their own, except under dual-quaternion blending and HAHA's scaled
     /// frames; `Σ b_k v_k + unit(Σ b_k n_k) offset` on the posed mesh for face-bound ones, under every strategy but the
-    /// latter. What a strategy does not need is not computed. The result is the same, bit for bit, for any number of
+    /// latter. Where joints scale, by one factor s_j each, standard deviations and offsets are multiplied by Σ w_j s_j
+    /// (covariances that B deforms and faces that scale follow anyway); of unequal factors the geometric mean counts, see
+    /// [`Strategy::ignored_scale`]. What a strategy does not need is not computed. The result is the same, bit for bit, for any number of
     /// threads and any width of vector instructions.
     ///
     /// # Errors
@@ -65,7 +67,8 @@ impl Poser {
         let produces = Produces::of(&frame);
         let parts = self.outputs(bound, &produces).split(bound.sh_count());
         parts.into_par_iter().enumerate().for_each(|(number, outputs)| {
-            PoseChunk { frame: &frame, start: number * CHUNK, outputs, relative: Vec::new() }.run(number);
+            let (relative, growth) = Default::default();
+            PoseChunk { frame: &frame, start: number * CHUNK, outputs, relative, growth }.run(number);
         });
         Ok(Posed {
             means: &self.means,
@@ -203,6 +206,8 @@ struct PoseChunk<'f, 'a, 'o> {
     outputs: Outputs<'o>,
     /// R of each Gaussian, for the SH, zero for one that is not seen; empty if they stay.
     relative: Vec<Quaternion<f32>>,
+    /// By how much each Gaussian grows; empty unless joints scale and offsets follow.
+    growth: Vec<f32>,
 }
 
 impl PoseChunk<'_, '_, '_> {
@@ -211,6 +216,9 @@ impl PoseChunk<'_, '_, '_> {
         let (frame, start) = (self.frame, self.start);
         if !self.outputs.sh.is_empty() {
             self.relative.resize(self.outputs.means.len(), [0.0; 4]);
+        }
+        if frame.offsets_grow() {
+            self.growth.resize(self.outputs.means.len(), 1.0);
         }
         let chunk = &frame.bound.chunks(frame.strategy.covariance)[number];
         frame.walk(chunk, start, &mut self);
@@ -240,7 +248,8 @@ impl PoseChunk<'_, '_, '_> {
             if let Some(motion) = self.frame.face_motion(gaussian) {
                 *mean = motion.apply(bound.means[gaussian]);
             } else if on_faces {
-                *mean = embedding.point(mesh);
+                let growth = self.growth.get(i).copied().unwrap_or(1.0);
+                *mean = embedding.grown(growth).point(mesh);
             }
         }
     }
@@ -268,6 +277,11 @@ impl Visitor for PoseChunk<'_, '_, '_> {
             }
             if let Some(relative) = self.relative.get_mut(i) {
                 *relative = take(&rotated.relative, lane);
+            }
+        }
+        if let (false, Some(growth)) = (self.growth.is_empty(), input.growth()) {
+            for lane in 0..block.count {
+                self.growth[usize::from(block.index[lane])] = growth[lane];
             }
         }
         if !outputs.view_frames.is_empty() {

@@ -1,7 +1,7 @@
 //! The axes of a strategy as plain data: closed enums, each variant with a stable id. (The rotation's are in `rotate`.)
 
-use super::{PosingError, RotationChoice};
-use skinsplat_core::scene::ColourClamp;
+use super::{PosingError, RotationChoice, joints};
+use skinsplat_core::scene::{ColourClamp, PosedBody};
 use std::fmt;
 use std::str::FromStr;
 
@@ -144,6 +144,24 @@ named!(
         ("unit", Unit, "colours cut to [0, 1]: Animatable"),
     ]
 );
+
+impl CovarianceChoice {
+    /// True if the covariance is rotated and keeps its shape, so that it has to be told of joints that scale.
+    pub(crate) fn keeps_shape(self) -> bool {
+        match self {
+            Self::Rotate | Self::Surfel => true,
+            Self::Affine | Self::AffineConjugate => false,
+        }
+    }
+}
+
+impl Strategy {
+    /// The first joint of a posed body that scales by unequal factors, which a strategy that only rotates Gaussians cannot
+    /// follow; `None` if there is none, or the strategy deforms covariances.
+    pub fn ignored_scale(&self, body: &PosedBody<'_>) -> Option<usize> {
+        self.covariance.keeps_shape().then(|| joints::first_sheared(&body.joints)).flatten()
+    }
+}
 
 impl From<ClampChoice> for ColourClamp {
     fn from(choice: ClampChoice) -> Self {

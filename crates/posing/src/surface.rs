@@ -46,6 +46,11 @@ impl Embedding {
         ([coordinate(0), coordinate(1), coordinate(2)], along)
     }
 
+    /// With an offset that has grown with the joints. A factor of 1 changes no bit.
+    pub(crate) fn grown(&self, growth: f32) -> Self {
+        Self { offset: self.offset * growth, ..*self }
+    }
+
     /// The barycentric coordinates as weights: cut at zero, summing to one.
     pub(crate) fn weights(&self) -> [f32; 3] {
         let cut = self.barycentric.map(|b| b.max(0.0));

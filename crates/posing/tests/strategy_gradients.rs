@@ -96,6 +96,21 @@ fn every_choice_of_every_axis() {
     }
 }
 
+/// Joints that scale: log scales, offsets and means of dual quaternions grow along, and their derivatives with them.
+#[test]
+fn every_choice_on_joints_that_scale() {
+    let rest = rig::body();
+    let at = rig::scaled(&rig::bent(&rest, 4, 0.9), 6);
+    let body = PosedBody::new(&rest, &at).unwrap();
+    for (seed, strategy) in (0..).zip(rig::strategies()) {
+        for avatar in avatars(&body, seed) {
+            let case = Case::new(with_degree(avatar, 1), &body);
+            assert_parameters(&case, &strategy, seed);
+            assert_sh(&case, &strategy, seed);
+        }
+    }
+}
+
 #[test]
 fn no_preset_and_no_choice_is_missed() {
     let all = rig::strategies();

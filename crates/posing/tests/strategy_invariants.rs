@@ -278,3 +278,49 @@ fn any_number_of_threads_gives_the_same_bits() {
         }
     }
 }
+
+/// `scale * LBS + transl` as a scaled root: a similarity of everything, under every strategy.
+#[test]
+fn a_body_that_is_scaled_as_a_whole_carries_its_gaussians_along() {
+    let body = rig::body();
+    for (seed, scale) in [(3, 1.25), (4, 0.01), (5, 100.0)] {
+        let at = rig::bent(&body, seed, 1.0);
+        let mut scaled = at.clone();
+        scaled.locals[0].scale = DVec3::splat(scale);
+        scaled.locals[0].translation *= scale;
+        for bound in avatars(&body, seed) {
+            for strategy in rig::strategies() {
+                let (plain, large) =
+                    (posed(&bound, &body, &at, &strategy), posed(&bound, &body, &scaled, &strategy));
+                let (t, s) = (at.translation.as_vec3(), scale as f32);
+                for i in 0..plain.len() {
+                    let off = (large.means[i] - t) / s - (plain.means[i] - t);
+                    assert!(
+                        off.length() < 1e-3 / s.min(1.0) * 0.02 + 2e-4,
+                        "{strategy}, {scale}: mean {i} by {off}"
+                    );
+                    let size = distance(&plain.factors[i], &Mat3::ZERO);
+                    let off = distance(&(large.factors[i] * (1.0 / s)), &plain.factors[i]);
+                    assert!(off < 2e-3 * size, "{strategy}, {scale}: factor {i} by {off} of {size}");
+                    let direction = DVec3::new(0.3, -0.5, 0.8).normalize();
+                    let off = (seen(&plain, i, direction) - seen(&large, i, direction)).length();
+                    assert!(off < 5e-3, "{strategy}, {scale}: colour {i} by {off}");
+                }
+            }
+        }
+    }
+}
+
+/// Factors that are all 1 change no bit, and unequal ones are said.
+#[test]
+fn scales_of_one_cost_nothing_and_unequal_ones_are_named() {
+    let body = rig::body();
+    let mut at = rig::bent(&body, 9, 1.0);
+    let posed_body = PosedBody::new(&body, &at).unwrap();
+    let average = strategy("quaternion-average");
+    assert_eq!(average.ignored_scale(&posed_body), None);
+    at.locals[2].scale = DVec3::new(1.0, 1.2, 1.0);
+    let posed_body = PosedBody::new(&body, &at).unwrap();
+    assert_eq!(average.ignored_scale(&posed_body), Some(2));
+    assert_eq!(strategy("quaternion-average+covariance=affine").ignored_scale(&posed_body), None);
+}

@@ -8,7 +8,7 @@ use super::truth::Model;
 use super::{figure, parameters::GENERATOR_VERSION};
 use skinsplat_core::scene::{Camera, Pose, RestBody, SceneError};
 use skinsplat_data::Capture;
-use skinsplat_data::{FrameGenerator, FrameRef, FrameSource, Sequence, SourceDigest, Sourced, Truth};
+use skinsplat_data::{Error, FrameGenerator, FrameRef, FrameSource, Sequence, SourceDigest, Sourced, Truth};
 use std::sync::Arc;
 
 /// A subject: a body, and sequences whose images are rendered when asked for.
@@ -106,6 +106,7 @@ impl Subject {
             let folder = if cameras.len() > 1 { format!("cam{camera:02}/") } else { String::new() };
             FrameRef {
                 name: format!("{folder}image_{pose:04}"),
+                time: pose,
                 pose,
                 camera,
                 source: FrameSource::Generated { generator: Arc::clone(&generator), frame },
@@ -135,15 +136,15 @@ struct Take {
 impl FrameGenerator for Take {
     /// # Panics
     /// If there is no such frame.
-    fn truth(&self, frame: usize) -> Truth {
+    fn truth(&self, frame: usize) -> Result<Truth, Error> {
         let (camera, pose) = (&self.cameras[frame / self.poses.len()], &self.poses[frame % self.poses.len()]);
         let drawing = self.model.draw(pose, camera);
         let drawing = drawing.expect("poses and cameras were made for this body from valid parameters");
-        Truth { rgb: drawing.colour, alpha: drawing.coverage }
+        Ok(Truth::new(drawing.colour, drawing.coverage))
     }
 
-    fn key(&self) -> String {
+    fn key(&self) -> Result<String, Error> {
         debug_assert!(self.key.starts_with(&format!("synthetic-v{GENERATOR_VERSION}-")));
-        self.key.clone()
+        Ok(self.key.clone())
     }
 }

@@ -1,10 +1,13 @@
 //! `reproduce inspect --needs`: what an avatar and a motion need.
 
+use super::super::Context as Terminal;
 use super::super::output::{Format, emit, emit_json};
 use super::line;
+use crate::run::foreign::on_body;
 use anyhow::{Context as _, Result, bail};
-use skinsplat_core::scene::{Binding, Body, Pose, RestBody};
-use skinsplat_data::{body, ply, poses};
+use skinsplat_core::scene::{Body, Pose, RestBody};
+use skinsplat_data::avatar::read_avatar;
+use skinsplat_data::{body, poses};
 use skinsplat_posing::needs::{Degrees, Extreme, Needs};
 use skinsplat_posing::{BoundAvatar, RotationChoice};
 use skinsplat_table::{Cell, Column, Label, Row, Table, text};
@@ -20,7 +23,7 @@ pub(super) struct Motion {
     /// Say what FILE, an avatar, needs in a motion: SH degree, influences, joints, angles, and which solvers are enough
     #[arg(long, requires = "poses")]
     needs: bool,
-    /// Poses: .npz, transforms.json, or a .glb or .gltf with clips
+    /// Poses: .npz or .pkl (smplx, AMASS, AIST++), transforms.json, or a .glb or .gltf with clips
     #[arg(long, value_name = "POSES", requires = "needs")]
     poses: Option<PathBuf>,
     /// Body model [default: the poses' file if it is glTF, else the one that the avatar names]
@@ -51,18 +54,19 @@ impl Motion {
     }
 
     /// Prints what the avatar needs.
-    pub(super) fn print(&self, avatar: &Path) -> Result<()> {
-        let stored = ply::read(avatar)?;
-        if matches!(stored.avatar.binding, Binding::Static) {
-            let expected = "joint and weight properties, or face, barycentric and offset properties";
-            bail!("{}: no binding; expected {expected}", avatar.display());
-        }
+    pub(super) fn print(&self, avatar: &Path, terminal: Terminal) -> Result<()> {
+        let loaded = read_avatar(avatar)?;
         let path = self.poses.as_deref().context("--poses is missing")?;
         let track = poses::load_clip(path, self.clip.as_deref())?;
-        let (body_path, model) = self.model(avatar, path, stored.body.as_deref())?;
-        let rest = model.shaped(&track.betas).with_context(|| format!("{}", path.display()))?;
+        let (body_path, model) = self.model(avatar, path, loaded.body.as_deref())?;
+        let betas = loaded.betas.clone().unwrap_or_else(|| track.betas.clone());
+        let shaped = body::shape(&model, &betas, &track.expression);
+        let (rest, _) = shaped.with_context(|| format!("{}", path.display()))?;
         let motion: Vec<Pose> = track.poses(&rest.skeleton)?.to_vec();
-        let bound = BoundAvatar::new(&stored.avatar, &rest).with_context(|| {
+        let on_body = on_body(loaded, &rest)?;
+        on_body.notes.iter().for_each(|note| terminal.note(format!("{}: {note}", avatar.display())));
+        let rest = on_body.body.unwrap_or(rest);
+        let bound = BoundAvatar::new(&on_body.avatar, &rest).with_context(|| {
             format!("{}: does not fit the body {}", avatar.display(), body_path.display())
         })?;
         let choices = if self.rotations.is_empty() { Needs::listed() } else { self.rotations.clone() };

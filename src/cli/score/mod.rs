@@ -8,7 +8,7 @@ use super::lpips::LpipsWeights;
 use super::output::{emit, emit_json, table_format, written};
 use super::selection::parse_colour;
 use super::{Context, Exit};
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use pairs::Pair;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -16,10 +16,11 @@ use skinsplat_core::scene::Image;
 use skinsplat_metrics::lpips::OneFrame;
 use skinsplat_metrics::lpips::weights::Networks;
 use skinsplat_metrics::{
-    FrameScore, LpipsVariant, MetricId, PerceptualDistance, Planes, Protocol, Truth, Wanted, all_variants,
+    FrameScore, LpipsVariant, MetricId, MetricsError, PerceptualDistance, Planes, Protocol, Truth, Wanted,
+    all_variants,
 };
 use skinsplat_table::{Table, text};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// Score renders against truth: two images, or two folders whose frames pair up by name.
@@ -79,6 +80,9 @@ struct Scored {
     not_computed: Map<String, Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     protocol: Option<FrameScore>,
+    /// Why the protocol has no score for this frame, though it has for others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    protocol_not_computed: Option<String>,
     #[serde(skip)]
     over_another_background: bool,
 }
@@ -97,6 +101,7 @@ impl Score {
         let score = |pair: &Pair| self.score(pair, protocol.as_ref(), &networks);
         let scored = pairs::each(&pairs()?, context, score)?;
         warn_of_backgrounds(&scored, context);
+        warn_of_missing(&scored, protocol.as_ref(), context)?;
         match (folders, self.format.as_str()) {
             (false, "json") => emit_json(&scored[0])?,
             (false, format) => emit_table(&summary::table(&scored, None, None), format)?,
@@ -132,9 +137,13 @@ impl Score {
         let metrics: Vec<MetricId> = MetricId::of_frames().collect();
         let wanted = Wanted { lpips: Some(&distances), ..Wanted::of(&metrics) };
         let protocol = protocol.map(|p| p.score_with(&render, truth, wanted)).transpose();
-        let protocol = protocol.with_context(context)?;
+        let (protocol, protocol_not_computed) = match protocol {
+            Err(empty @ MetricsError::EmptyRegion { .. }) => (None, Some(empty.to_string())),
+            protocol => (protocol.with_context(context)?, None),
+        };
         let over_another_background = loaded.lies_over_another(background);
-        Ok(Scored { name: pair.name.clone(), variants, not_computed, protocol, over_another_background })
+        let name = pair.name.clone();
+        Ok(Scored { name, variants, not_computed, protocol, protocol_not_computed, over_another_background })
     }
 }
 
@@ -162,13 +171,26 @@ fn warn_of_backgrounds(scored: &[Scored], context: Context) {
     }
 }
 
+/// Frames without a score under the protocol; it is an error if none has one.
+fn warn_of_missing(scored: &[Scored], protocol: Option<&Protocol>, context: Context) -> Result<()> {
+    let missing = |frame: &Scored| Some((frame.name.clone(), frame.protocol_not_computed.clone()?));
+    let missing: Vec<(String, String)> = scored.iter().filter_map(missing).collect();
+    let (Some(protocol), Some((name, reason))) = (protocol, missing.first()) else { return Ok(()) };
+    if missing.len() == scored.len() {
+        bail!("{name}: {reason}, protocol {}", protocol.id);
+    }
+    let (some, all) = (missing.len(), scored.len());
+    context.note(format!(
+        "warning: protocol {}: no score for {some} of {all} frames ({name}: {reason})",
+        protocol.id
+    ));
+    Ok(())
+}
+
 fn emit_folder(scored: &[Scored], protocol: Option<&Protocol>, format: &str) -> Result<()> {
-    let mean = means(scored);
-    let scores: Option<Vec<FrameScore>> = scored.iter().map(|frame| frame.protocol.clone()).collect();
-    let summary = match (protocol, scores) {
-        (Some(protocol), Some(scores)) => Some(protocol.aggregate(&scores)?),
-        _ => None,
-    };
+    let mean = Means::of(scored);
+    let scores: Vec<FrameScore> = scored.iter().filter_map(|frame| frame.protocol.clone()).collect();
+    let summary = protocol.map(|protocol| protocol.aggregate(&scores)).transpose()?;
     if format == "json" {
         let frames: BTreeMap<&str, &Scored> = scored.iter().map(|f| (f.name.as_str(), f)).collect();
         return emit_json(&json!({ "frames": frames, "mean": mean, "protocol": summary }));
@@ -184,16 +206,32 @@ fn emit_table(table: &Table, format: &str) -> Result<()> {
     }
 }
 
-/// Means over the frames, in their order; only of variants that every frame has. One infinite PSNR makes its mean
-/// infinite.
-fn means(scored: &[Scored]) -> Map<String, Value> {
-    let Some(first) = scored.first() else { return Map::new() };
-    let mean = |id: &String| {
-        let values: Option<Vec<&Value>> = scored.iter().map(|frame| frame.variants.get(id)).collect();
-        let sum: f64 = values?.iter().map(|v| v.as_f64().unwrap_or(f64::INFINITY)).sum();
-        Some((id.clone(), number(sum / scored.len() as f64)))
-    };
-    first.variants.keys().filter_map(mean).collect()
+/// Means over the frames, in their order, of variants that every frame has. One infinite PSNR makes its mean infinite.
+#[derive(Serialize)]
+struct Means {
+    #[serde(flatten)]
+    variants: Map<String, Value>,
+    /// Variants that only some frames have.
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    not_computed: Map<String, Value>,
+}
+
+impl Means {
+    fn of(scored: &[Scored]) -> Self {
+        let ids: BTreeSet<&String> = scored.iter().flat_map(|frame| frame.variants.keys()).collect();
+        let (mut variants, mut not_computed) = (Map::new(), Map::new());
+        for id in ids {
+            let values: Vec<&Value> = scored.iter().filter_map(|frame| frame.variants.get(id)).collect();
+            if values.len() < scored.len() {
+                let reason = format!("{} of {} frames have it", values.len(), scored.len());
+                not_computed.insert(id.clone(), reason.into());
+                continue;
+            }
+            let sum: f64 = values.iter().map(|v| v.as_f64().unwrap_or(f64::INFINITY)).sum();
+            variants.insert(id.clone(), number(sum / scored.len() as f64));
+        }
+        Self { variants, not_computed }
+    }
 }
 
 /// JSON has no infinity: `null`.

@@ -3,10 +3,11 @@
 use crate::cli::Context;
 use crate::cli::progress::Watch;
 use crate::run::Event;
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use rayon::prelude::*;
 use skinsplat_core::scene::{Image, Mask};
 use skinsplat_data::frames::{load_image, load_mask};
+use skinsplat_data::listing;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -120,15 +121,9 @@ impl Loaded {
 
 /// Image files of a folder by stem, sorted.
 fn frames_of(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
-    let context = || format!("{}: cannot list the folder", folder.display());
     let mut frames = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).with_context(context)? {
-        let path = entry.with_context(context)?.path();
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    for path in listing::files(folder, "frames", &["png", "jpg", "jpeg", "npy"])? {
         let Some(stem) = path.file_stem().and_then(|s| s.to_str()) else { continue };
-        if !["png", "jpg", "jpeg", "npy"].contains(&extension.as_str()) {
-            continue;
-        }
         if let Some(other) = frames.insert(stem.to_owned(), path.clone()) {
             bail!("{} and {}: one name; expected one image per frame", other.display(), path.display());
         }

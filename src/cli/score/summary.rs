@@ -1,6 +1,6 @@
 //! Scores of frames as a table: a row per variant, under its frame.
 
-use super::Scored;
+use super::{Means, Scored};
 use serde_json::{Map, Value};
 use skinsplat_metrics::{FrameScore, MetricId, ProtocolId, Summary, Values};
 use skinsplat_table::{Cell, Column, Content, Digits, Label, Row, RowKind, Table};
@@ -10,11 +10,7 @@ use std::collections::BTreeMap;
 const DIGITS: Digits = Digits::Decimals(6);
 
 /// The frames, and under several their means.
-pub(super) fn table(
-    scored: &[Scored],
-    means: Option<&Map<String, Value>>,
-    summary: Option<&Summary>,
-) -> Table {
+pub(super) fn table(scored: &[Scored], means: Option<&Means>, summary: Option<&Summary>) -> Table {
     let mut table = Table {
         labels: vec![Label::new("frame", "Frame").once(), Label::new("metric", "Metric")],
         columns: vec![Column::new("value", "Value").digits(DIGITS)],
@@ -26,7 +22,8 @@ pub(super) fn table(
     if let Some(means) = means {
         let name = format!("mean of {} frames", scored.len());
         let mut mean = Frame { name: &name, kind: RowKind::Mean, table: &mut table };
-        mean.values(means);
+        mean.values(&means.variants);
+        mean.missing(&means.not_computed);
         if let Some(Summary { protocol, values, not_computed, .. }) = summary {
             mean.protocol(protocol, values, not_computed);
         }
@@ -44,11 +41,15 @@ struct Frame<'a> {
 impl Frame<'_> {
     fn add(&mut self, frame: &Scored) {
         self.values(&frame.variants);
-        for (id, reason) in &frame.not_computed {
-            self.none(id, &format!("{id} not computed: {}", reason.as_str().unwrap_or_default()));
-        }
+        self.missing(&frame.not_computed);
         if let Some(FrameScore { protocol, values, not_computed, .. }) = &frame.protocol {
             self.protocol(protocol, values, not_computed);
+        }
+    }
+
+    fn missing(&mut self, reasons: &Map<String, Value>) {
+        for (id, reason) in reasons {
+            self.none(id, &format!("{id} not computed: {}", reason.as_str().unwrap_or_default()));
         }
     }
 

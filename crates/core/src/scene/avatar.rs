@@ -13,9 +13,9 @@ pub struct Gaussians {
     pub means: Vec<Vec3>,
     /// Quaternions (w, x, y, z), not necessarily of unit length.
     pub rotations: Vec<[f32; 4]>,
-    /// Natural logarithms of the standard deviations, metres.
+    /// Natural logarithms of the standard deviations, metres; -∞ has no extent along its axis.
     pub log_scales: Vec<Vec3>,
-    /// Opacities before the sigmoid.
+    /// Opacities before the sigmoid; ±∞ are an opacity of 1 and of 0.
     pub opacity_logits: Vec<f32>,
     /// SH degree, 0 to 3.
     pub sh_degree: usize,
@@ -23,8 +23,12 @@ pub struct Gaussians {
     pub sh: Vec<[f32; 3]>,
 }
 
+/// What most parameters have to be.
+const FINITE: &str = "finite values";
+
 impl Gaussians {
     /// Number of Gaussians.
+    #[inline]
     pub fn len(&self) -> usize {
         self.means.len()
     }
@@ -35,6 +39,7 @@ impl Gaussians {
     }
 
     /// Coefficients per Gaussian and channel: `(sh_degree + 1)^2`.
+    #[inline]
     pub fn sh_count(&self) -> usize {
         (self.sh_degree + 1).pow(2)
     }
@@ -63,8 +68,8 @@ impl Gaussians {
         1.0 / (1.0 + portable::exp(-self.opacity_logits[i]))
     }
 
-    /// Checks that all arrays have the same length, that every value is finite, that no quaternion is zero and that
-    /// scales are representable.
+    /// Checks that all arrays have the same length, that every value is finite once it is activated (a logit may be
+    /// infinite, a log scale -∞), that no quaternion is zero and that scales are representable.
     ///
     /// # Errors
     /// Names the first array and index that is wrong, in the names of the PLY properties.
@@ -86,17 +91,16 @@ impl Gaussians {
         }
         for i in 0..n {
             let sh = &self.sh[i * self.sh_count()..(i + 1) * self.sh_count()];
-            let finite = [
-                ("x, y, z", self.means[i].is_finite()),
-                ("rot", self.rotations[i].iter().all(|v| v.is_finite())),
-                ("scale", self.log_scales[i].is_finite()),
-                ("opacity", self.opacity_logits[i].is_finite()),
-                ("f_dc/f_rest", sh.iter().flatten().all(|v| v.is_finite())),
+            let logs = self.log_scales[i].to_array();
+            let checks = [
+                ("x, y, z", self.means[i].is_finite(), FINITE),
+                ("rot", self.rotations[i].iter().all(|v| v.is_finite()), FINITE),
+                ("scale", logs.iter().all(|v| *v < f32::INFINITY), "finite logarithms of metres, or -inf"),
+                ("opacity", !self.opacity_logits[i].is_nan(), "a finite logit, inf or -inf"),
+                ("f_dc/f_rest", sh.iter().flatten().all(|v| v.is_finite()), FINITE),
             ];
-            for (field, ok) in finite {
-                if !ok {
-                    return Err(SceneError::new(format!("{field}[{i}]"), "NaN or infinite", "finite values"));
-                }
+            if let Some((field, _, expected)) = checks.iter().find(|(_, fine, _)| !fine) {
+                return Err(SceneError::new(format!("{field}[{i}]"), "NaN or infinite", *expected));
             }
             if self.rotations[i].iter().all(|&v| v == 0.0) {
                 return Err(SceneError::new(format!("rot[{i}]"), "zero quaternion", "a length above 0"));

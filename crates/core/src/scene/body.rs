@@ -1,7 +1,7 @@
 //! Bodies at rest: skeleton, template mesh, shape space, skinning weights.
 
-use super::{SceneError, Skeleton, SkinWeights};
-use glam::{DVec3, Vec3};
+use super::{Pose, PosedBody, SceneError, Skeleton, SkinWeights};
+use glam::{DAffine3, DVec3, Vec3};
 
 /// Texture coordinates with an index of their own per face corner (OBJ convention, v up).
 #[derive(Clone, Debug, PartialEq)]
@@ -86,6 +86,33 @@ impl RestBody {
         self.weights.mixed(&[0, 1, 2].map(|k: usize| (corners[k] as usize, barycentric[k])))
     }
 
+    /// The same body, with a pose in the place of its rest pose: for what is measured on the body in that pose (the canonical
+    /// pose of HUGS). A pose of `self` is one of the new body and puts each joint where it was; vertices with several joints
+    /// blend motions from the new rest pose, which is why the two are not the same surface. Blend shapes of poses are left out.
+    ///
+    /// # Errors
+    /// As [`PosedBody::new`]; a joint that the pose scales to nothing.
+    pub fn in_pose(&self, pose: &Pose) -> Result<Self, SceneError> {
+        let pose = Pose { blend_shape_rotations: None, ..pose.clone() };
+        let posed = PosedBody::new(self, &pose)?;
+        let bind = |(joint, bind): (&super::JointTransform, &DAffine3)| {
+            *bind * DAffine3::from_mat3_translation(joint.linear, joint.translation).inverse()
+        };
+        let inverse_binds = posed.joints.iter().zip(&self.skeleton.inverse_binds).map(bind).collect();
+        let vertices = posed.vertices();
+        // The translation is part of every joint, so the new rest pose has it in the roots.
+        let moved = |(local, parent): (&super::LocalTransform, &Option<usize>)| match parent {
+            Some(_) => *local,
+            None => super::LocalTransform { translation: local.translation + pose.translation, ..*local },
+        };
+        let Skeleton { names, parents, .. } = self.skeleton.clone();
+        let rest_locals = pose.locals.iter().zip(&parents).map(moved).collect();
+        let skeleton = Skeleton::new(names, parents, rest_locals, inverse_binds)?;
+        let weights = self.weights.clone();
+        let (faces, uv) = (self.faces.clone(), self.uv.clone());
+        Ok(Self { skeleton, vertices, faces, weights, uv, pose_directions: Vec::new() })
+    }
+
     /// The first vertex beyond [`MAX_COORDINATE`], and where it is.
     fn first_far_vertex(&self) -> Option<(usize, String)> {
         let too_far = |p: &DVec3| p.to_array().into_iter().any(|c| c.is_nan() || c.abs() > MAX_COORDINATE);
@@ -117,6 +144,8 @@ impl RestBody {
 pub struct ShapeSpace {
     /// Per direction, one offset per vertex, metres per unit.
     pub directions: Vec<Vec<Vec3>>,
+    /// The same for facial expressions (SMPL-X); empty if there are none.
+    pub expressions: Vec<Vec<Vec3>>,
     /// Sparse rows (vertex, weight) per joint; empty if joints do not follow the shape.
     pub joint_regressor: Vec<Vec<(u32, f32)>>,
 }
@@ -136,17 +165,21 @@ impl Body {
     /// # Errors
     /// More non-zero betas than directions, or a beta that is not finite.
     pub fn shaped(&self, betas: &[f64]) -> Result<RestBody, SceneError> {
-        let known = self.shape.as_ref().map_or(0, |s| s.directions.len());
-        if let Some(i) = betas.iter().position(|b| !b.is_finite()) {
-            return Err(SceneError::new(format!("betas[{i}]"), "NaN or infinite", "finite values"));
-        }
-        if let Some(i) = betas.iter().skip(known).position(|&b| b != 0.0) {
-            let problem = format!("{} of a body with {known} shape directions", betas[known + i]);
-            return Err(SceneError::new(format!("betas[{}]", known + i), problem, "0"));
-        }
+        self.shaped_with(betas, &[])
+    }
+
+    /// As [`Body::shaped`], with a facial expression (SMPL-X), which joints follow too. Missing coefficients are zero.
+    ///
+    /// # Errors
+    /// As [`Body::shaped`], of both kinds of coefficients.
+    pub fn shaped_with(&self, betas: &[f64], expression: &[f64]) -> Result<RestBody, SceneError> {
+        let known = self.shape.as_ref().map_or([0; 2], |s| [s.directions.len(), s.expressions.len()]);
+        check_coefficients("betas", betas, known[0], "shape")?;
+        check_coefficients("expression", expression, known[1], "expression")?;
         let mut rest = self.rest.clone();
         let Some(shape) = &self.shape else { return Ok(rest) };
-        for (direction, &beta) in shape.directions.iter().zip(betas) {
+        let shapes = shape.directions.iter().zip(betas);
+        for (direction, &beta) in shapes.chain(shape.expressions.iter().zip(expression)) {
             for (vertex, offset) in rest.vertices.iter_mut().zip(direction) {
                 *vertex += offset.as_dvec3() * beta;
             }
@@ -160,11 +193,24 @@ impl Body {
                 row.iter().map(|&(v, w)| rest.vertices[v as usize] * f64::from(w)).sum()
             };
             let positions: Vec<DVec3> = shape.joint_regressor.iter().map(joint).collect();
-            let Skeleton { names, parents, .. } = rest.skeleton;
+            let Skeleton { names, parents, hands, .. } = rest.skeleton;
             rest.skeleton = Skeleton::from_joint_positions(names, parents, &positions)?;
+            rest.skeleton.hands = hands;
         }
         Ok(rest)
     }
+}
+
+/// That all coefficients are finite, and those beyond the `known` directions zero.
+fn check_coefficients(name: &str, values: &[f64], known: usize, what: &str) -> Result<(), SceneError> {
+    if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+        return Err(SceneError::new(format!("{name}[{i}]"), "NaN or infinite", "finite values"));
+    }
+    if let Some(i) = values.iter().skip(known).position(|&v| v != 0.0) {
+        let problem = format!("{} of a body with {known} {what} directions", values[known + i]);
+        return Err(SceneError::new(format!("{name}[{}]", known + i), problem, "0"));
+    }
+    Ok(())
 }
 
 /// Area-weighted unit vertex normals; zero where every incident face is degenerate.
@@ -208,6 +254,24 @@ mod tests {
         assert_eq!(body.validate().unwrap_err().field, "weights[0]");
     }
 
+    #[test]
+    fn a_body_in_a_pose_rests_there_and_moves_its_joints_as_before() {
+        let body = arm();
+        let angles = [DVec3::new(0.3, -0.2, 0.1), DVec3::Z];
+        let canonical = Pose::from_axis_angles(&body.skeleton, &angles, DVec3::new(0.0, 2.0, 0.0));
+        let turned = body.in_pose(&canonical).unwrap();
+        let at_rest = PosedBody::new(&turned, &Pose::rest(&turned.skeleton)).unwrap();
+        let there = PosedBody::new(&body, &canonical).unwrap();
+        for (i, vertex) in turned.vertices.iter().enumerate() {
+            assert!((at_rest.vertices()[i] - *vertex).length() < 1e-12);
+            assert!((there.vertices()[i] - *vertex).length() < 1e-12);
+        }
+        // A vertex of one joint goes wherever it goes from the old rest pose.
+        let pose = Pose::from_axis_angles(&body.skeleton, &[DVec3::Y, DVec3::X], DVec3::X);
+        let [old, new] = [&body, &turned].map(|body| PosedBody::new(body, &pose).unwrap().vertices());
+        assert!((old[0] - new[0]).length() < 1e-12 && (old[1] - new[1]).length() < 1e-12);
+    }
+
     /// What can be read as an `f64` and not be squared.
     #[test]
     fn coordinates_beyond_what_can_be_squared_are_refused_by_name() {
@@ -215,7 +279,8 @@ mod tests {
         body.vertices[2].y = 1e160;
         assert_eq!(body.validate().unwrap_err().field, "v_template[2]");
         let direction = vec![Vec3::ZERO, Vec3::X, Vec3::ZERO];
-        let shape = ShapeSpace { directions: vec![direction], joint_regressor: Vec::new() };
+        let shape =
+            ShapeSpace { directions: vec![direction], expressions: Vec::new(), joint_regressor: Vec::new() };
         let model = Body { rest: arm(), shape: Some(shape) };
         model.shaped(&[1e9]).unwrap().validate().unwrap();
         for beta in [1e13, 1e160, -1e300] {

@@ -82,6 +82,7 @@ impl Camera {
     }
 
     /// The camera centre in world coordinates.
+    #[inline]
     pub fn position(&self) -> DVec3 {
         self.camera_from_world.inverse().w_axis.truncate()
     }

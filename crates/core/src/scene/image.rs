@@ -34,26 +34,31 @@ impl Image {
     }
 
     /// Width in pixels.
+    #[inline]
     pub fn width(&self) -> usize {
         self.width
     }
 
     /// Height in pixels.
+    #[inline]
     pub fn height(&self) -> usize {
         self.height
     }
 
     /// All pixels, row by row.
+    #[inline]
     pub fn pixels(&self) -> &[[f32; 3]] {
         &self.pixels
     }
 
     /// All pixels, mutable.
+    #[inline]
     pub fn pixels_mut(&mut self) -> &mut [[f32; 3]] {
         &mut self.pixels
     }
 
     /// One pixel.
+    #[inline]
     pub fn at(&self, x: usize, y: usize) -> [f32; 3] {
         self.pixels[y * self.width + x]
     }
@@ -93,26 +98,31 @@ impl Mask {
     }
 
     /// Width in pixels.
+    #[inline]
     pub fn width(&self) -> usize {
         self.width
     }
 
     /// Height in pixels.
+    #[inline]
     pub fn height(&self) -> usize {
         self.height
     }
 
     /// All values, row by row.
+    #[inline]
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
     /// All values, mutable.
+    #[inline]
     pub fn values_mut(&mut self) -> &mut [f32] {
         &mut self.values
     }
 
     /// One value.
+    #[inline]
     pub fn at(&self, x: usize, y: usize) -> f32 {
         self.values[y * self.width + x]
     }

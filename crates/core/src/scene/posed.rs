@@ -41,6 +41,7 @@ pub struct Posed<'a> {
 
 impl Posed<'_> {
     /// Number of Gaussians.
+    #[inline]
     pub fn len(&self) -> usize {
         self.means.len()
     }
@@ -111,6 +112,7 @@ impl OwnedPosed {
     }
 
     /// What a renderer draws.
+    #[inline]
     pub fn as_posed(&self) -> Posed<'_> {
         Posed {
             means: &self.means,
@@ -125,6 +127,7 @@ impl OwnedPosed {
     }
 
     /// Number of Gaussians.
+    #[inline]
     pub fn len(&self) -> usize {
         self.means.len()
     }

@@ -94,14 +94,19 @@ impl<'a> PosedBody<'a> {
     /// The skinned mesh (Eq. 6), computed in f64 on first use.
     pub fn mesh(&self) -> &PosedMesh {
         self.mesh.get_or_init(|| {
-            let rest = self.posed_rest_vertices();
-            let vertices: Vec<DVec3> = (0..rest.len()).map(|i| self.skinned(i, rest[i])).collect();
+            let vertices = self.vertices();
             let normals = vertex_normals(&vertices, &self.rest.faces);
             PosedMesh {
                 vertices: vertices.iter().map(|v| v.as_vec3()).collect(),
                 normals: normals.iter().map(|n| n.as_vec3()).collect(),
             }
         })
+    }
+
+    /// World positions of the skinned vertices, metres.
+    pub(super) fn vertices(&self) -> Vec<DVec3> {
+        let rest = self.posed_rest_vertices();
+        (0..rest.len()).map(|i| self.skinned(i, rest[i])).collect()
     }
 
     fn skinned(&self, vertex: usize, position: DVec3) -> DVec3 {

@@ -1,7 +1,8 @@
 //! Hierarchies of joints.
 
-use super::SceneError;
+use super::{HandSpaces, SceneError};
 use glam::{DAffine3, DQuat, DVec3};
+use std::sync::Arc;
 
 /// Translation, rotation and scale of a node relative to its parent, applied in the order scale, rotation, translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +38,8 @@ pub struct Skeleton {
     pub rest_locals: Vec<LocalTransform>,
     /// Joint-from-mesh transform in the bind pose, one per deforming joint.
     pub inverse_binds: Vec<DAffine3>,
+    /// How hand poses are read, of models that say so.
+    pub hands: Option<Arc<HandSpaces>>,
     order: Vec<usize>,
 }
 
@@ -76,7 +79,7 @@ impl Skeleton {
             return Err(SceneError::new(format!("inverse bind[{i}]"), "NaN or infinite", "finite values"));
         }
         let order = topological_order(&parents)?;
-        Ok(Self { names, parents, rest_locals, inverse_binds, order })
+        Ok(Self { names, parents, rest_locals, inverse_binds, hands: None, order })
     }
 
     /// A skeleton of pure translations (SMPL): joint positions in the rest pose.
@@ -106,6 +109,7 @@ impl Skeleton {
     }
 
     /// Number of nodes.
+    #[inline]
     pub fn len(&self) -> usize {
         self.parents.len()
     }
@@ -116,6 +120,7 @@ impl Skeleton {
     }
 
     /// Number of nodes that deform the mesh.
+    #[inline]
     pub fn num_joints(&self) -> usize {
         self.inverse_binds.len()
     }

@@ -16,6 +16,30 @@ impl SkinWeights {
     /// How far a row's sum may be from one (16-bit normalised files are off by 3e-5). Values are kept as given.
     pub const SUM_TOLERANCE: f64 = 1e-3;
 
+    /// How far a row's sum may be from one for [`SkinWeights::normalise`] to repair it: three influences of 8 bits, or
+    /// weights cut to the largest four, stay within.
+    pub const REPAIRABLE: f64 = 0.0301;
+
+    /// Divides rows by their sum where that is off by more than [`SkinWeights::SUM_TOLERANCE`] and by no more than
+    /// [`SkinWeights::REPAIRABLE`]. Says how many there were and how far off, if any.
+    pub fn normalise(rows: &mut [Vec<(usize, f32)>]) -> Option<String> {
+        let (mut count, mut least, mut most) = (0, f64::MAX, f64::MIN);
+        for row in rows.iter_mut() {
+            let sum: f64 = row.iter().map(|(_, w)| f64::from(*w)).sum();
+            let off = (sum - 1.0).abs();
+            if off > Self::SUM_TOLERANCE && off <= Self::REPAIRABLE {
+                row.iter_mut().for_each(|(_, w)| *w = (f64::from(*w) / sum) as f32);
+                (count, least, most) = (count + 1, sum.min(least), sum.max(most));
+            }
+        }
+        (count > 0).then(|| {
+            format!(
+                "{count} of {} rows summed to {least:.4} to {most:.4} and were divided by their sum",
+                rows.len()
+            )
+        })
+    }
+
     /// Builds the table from rows of (joint, weight), dropping exact zeros.
     ///
     /// # Errors
@@ -47,6 +71,7 @@ impl SkinWeights {
     }
 
     /// Number of rows.
+    #[inline]
     pub fn len(&self) -> usize {
         self.offsets.len() - 1
     }
@@ -57,6 +82,7 @@ impl SkinWeights {
     }
 
     /// The joints and weights of row `i`, in stored order.
+    #[inline]
     pub fn row(&self, i: usize) -> (&[u16], &[f32]) {
         let range = self.offsets[i] as usize..self.offsets[i + 1] as usize;
         (&self.joints[range.clone()], &self.weights[range])

@@ -1,34 +1,59 @@
-//! Body models: SMPL-style `.npz` and skinned glTF 2.0, told apart by content.
+//! Body models: SMPL-style `.npz` and `.pkl`, and skinned glTF 2.0, told apart by content.
 
+mod shape;
 mod smpl;
 
-use super::Error;
+pub use shape::shape;
+
+use super::{Error, gltf, pickle};
 use skinsplat_core::scene::Body;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Loads a body model.
+/// A body model, and what has to be said of how it was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// The model.
+    pub body: Body,
+    /// What was guessed, repaired or left out, a clause each.
+    pub notes: Vec<String>,
+}
+
+/// Loads a body model: SMPL, SMPL-H or SMPL-X (or one in their layout, of any number of vertices) as `.npz` or as the
+/// original `.pkl`, or a skinned glTF 2.0 file.
 ///
 /// # Errors
-/// A file that is neither `.npz`, `.glb` nor `.gltf`, or whose content is not a consistent body.
-pub fn load(path: &Path) -> Result<Body, Error> {
+/// A file that is none of them, or whose content is not a consistent body; a pickle that names a class that is not read.
+pub fn read(path: &Path) -> Result<Loaded, Error> {
     match Format::of(path)? {
-        Format::Npz => smpl::load(path),
-        Format::Gltf => super::gltf::Rig::load(path).map(|rig| rig.body),
+        Format::Npz | Format::Pickle => smpl::load(path),
+        Format::Gltf => {
+            let gltf::Rig { body, notes, .. } = gltf::Rig::load(path)?;
+            Ok(Loaded { body, notes })
+        }
     }
+}
+
+/// The model of [`read`] alone.
+///
+/// # Errors
+/// As [`read`].
+pub fn load(path: &Path) -> Result<Body, Error> {
+    read(path).map(|loaded| loaded.body)
 }
 
 /// What a body or pose file is, judged by its first bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     Npz,
+    Pickle,
     Gltf,
 }
 
 impl Format {
     pub(super) fn of(path: &Path) -> Result<Self, Error> {
-        let expected = "an .npz, .glb or .gltf file";
+        let expected = "an .npz, .pkl, .glb or .gltf file";
         let unreadable = |cause| Error::read(path, "file", expected, cause);
         let mut start = Vec::new();
         File::open(path).map_err(unreadable)?.take(64).read_to_end(&mut start).map_err(unreadable)?;
@@ -37,9 +62,8 @@ impl Format {
             Ok(Self::Npz)
         } else if start.starts_with(b"glTF") || text.starts_with(b"{") {
             Ok(Self::Gltf)
-        } else if start.starts_with(b"\x80") {
-            let problem = "a Python pickle, which can run code and is not read";
-            Err(Error::invalid(path, "file", problem, "the same arrays saved with numpy.savez"))
+        } else if pickle::is_pickle_file(path, &start) {
+            Ok(Self::Pickle)
         } else {
             Err(Error::invalid(path, "file", "unknown format", expected))
         }

@@ -1,19 +1,33 @@
 //! A glTF document with its buffers, and accessors that are checked before they are read.
 
 use super::super::{Error, error};
+use super::text;
 use ::gltf::accessor::{DataType, Dimensions, Item, Iter};
 use ::gltf::json::validation::Checked;
-use ::gltf::{Accessor, Document, Gltf, buffer, image};
+use ::gltf::{Accessor, Document, buffer, image};
 use base64::Engine;
 use glam::Mat4;
 use skinsplat_core::scene::SceneError;
-use std::path::{Path, PathBuf};
+use std::io::{self, Read};
+use std::path::{Component, Path, PathBuf};
 
 /// A parsed document and the bytes that it refers to.
 pub(in super::super) struct Source {
     pub(super) document: Document,
     buffers: Vec<Vec<u8>>,
     folder: PathBuf,
+    /// Bytes of the document and its buffers.
+    pub(super) size: usize,
+    /// What has to be said of the document.
+    pub(super) notes: Vec<String>,
+}
+
+/// No encoded image of more bytes is read.
+const MAX_IMAGE: usize = 1 << 28;
+
+/// A URI as a message shows it.
+fn shortened(uri: &str) -> String {
+    uri.chars().take(80).collect()
 }
 
 impl Source {
@@ -21,13 +35,17 @@ impl Source {
         let expected = "a glTF 2.0 document";
         let bytes = error::read_bytes(path, "glTF", expected)?;
         let invalid = |cause: ::gltf::Error| Error::invalid(path, "glTF", one_line(&cause), expected);
-        let Gltf { document, blob } = Gltf::from_slice_without_validation(&bytes).map_err(invalid)?;
-        let root = document.into_json();
-        check_root(&root).map_err(|e| Error::scene(path, e))?;
+        let (json, blob) = text::split(&bytes).map_err(invalid)?;
+        let named = |e: SceneError| Error::scene(path, e);
+        let mut root = text::parse(&json).map_err(named)?;
+        let notes = text::check_extensions(&mut root).map_err(named)?;
+        check_root(&root).map_err(named)?;
         let document = Document::from_json(root).map_err(invalid)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let mut source = Self { document, buffers: Vec::new(), folder };
-        source.buffers = source.load_buffers(blob).map_err(|e| Error::scene(path, e))?;
+        let size = bytes.len();
+        let mut source = Self { document, buffers: Vec::new(), folder, size, notes };
+        source.buffers = source.load_buffers(blob).map_err(named)?;
+        source.size += source.buffers.iter().map(Vec::len).sum::<usize>();
         Ok(source)
     }
 
@@ -38,7 +56,7 @@ impl Source {
                 buffer::Source::Bin => blob
                     .take()
                     .ok_or_else(|| SceneError::new(&field, "no binary chunk", "a .glb with its BIN chunk"))?,
-                buffer::Source::Uri(uri) => self.resolve(uri, &field)?,
+                buffer::Source::Uri(uri) => self.resolve(uri, &field, buffer.length())?,
             };
             if bytes.len() < buffer.length() {
                 let problem = format!("truncated, {} bytes", bytes.len());
@@ -49,10 +67,11 @@ impl Source {
         self.document.buffers().map(load).collect()
     }
 
-    /// The bytes behind a `data:` URI or a relative path.
-    fn resolve(&self, uri: &str, field: &str) -> Result<Vec<u8>, SceneError> {
+    /// The first `limit` bytes behind a `data:` URI or a path to a regular file below the document's folder.
+    fn resolve(&self, uri: &str, field: &str, limit: usize) -> Result<Vec<u8>, SceneError> {
         let broken = |problem: String| {
-            SceneError::new(format!("{field}.uri"), problem, "a relative path or a base64 data URI")
+            let expected = "a path to a file in the document's folder, or a base64 data URI";
+            SceneError::new(format!("{field}.uri"), problem, expected)
         };
         if let Some(data) = uri.strip_prefix("data:") {
             let (_, text) =
@@ -60,11 +79,25 @@ impl Source {
             return base64::engine::general_purpose::STANDARD.decode(text).map_err(|e| broken(e.to_string()));
         }
         if uri.contains(':') {
-            return Err(broken(format!("{uri:?}")));
+            return Err(broken(format!("{:?}", shortened(uri))));
         }
         let relative = urlencoding::decode(uri).map_err(|e| broken(e.to_string()))?;
-        let path = self.folder.join(relative.as_ref());
-        std::fs::read(&path).map_err(|e| broken(format!("{}: {e}", path.display())))
+        let relative = Path::new(relative.as_ref());
+        let inside = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+        if !relative.components().all(inside) {
+            return Err(broken(format!("{:?} leads out of the folder", shortened(uri))));
+        }
+        let path = self.folder.join(relative);
+        let read = || {
+            let file = std::fs::metadata(&path).and_then(|about| match about.is_file() {
+                true => std::fs::File::open(&path),
+                false => Err(io::Error::new(io::ErrorKind::InvalidInput, "no regular file")),
+            })?;
+            let mut bytes = Vec::new();
+            file.take(limit as u64).read_to_end(&mut bytes)?;
+            Ok(bytes)
+        };
+        read().map_err(|e: io::Error| broken(format!("{}: {e}", path.display())))
     }
 
     /// The encoded bytes of an image.
@@ -77,7 +110,7 @@ impl Source {
                 Some(view) => self.view(&view, &field).map(<[u8]>::to_vec),
                 None => Err(SceneError::new(field, "no such buffer view", "a buffer view or a URI")),
             },
-            (None, Some(uri)) => self.resolve(uri, &field),
+            (None, Some(uri)) => self.resolve(uri, &field, MAX_IMAGE),
             (None, None) => Err(SceneError::new(field, "no source", "a buffer view or a URI")),
         }
     }
@@ -127,6 +160,75 @@ impl Source {
         Iter::new(accessor.clone(), data)
             .map(Iterator::collect)
             .ok_or_else(|| SceneError::new(field, "no data", "an accessor with a buffer view"))
+    }
+
+    /// Vectors of floats or of integers, which stand for themselves, or for fractions where the accessor is normalised.
+    pub(super) fn vectors<const N: usize>(
+        &self,
+        accessor: &Accessor,
+        dimensions: Dimensions,
+        field: &str,
+    ) -> Result<Vec<[f64; N]>, SceneError>
+    where
+        [i8; N]: Item,
+        [u8; N]: Item,
+        [i16; N]: Item,
+        [u16; N]: Item,
+        [f32; N]: Item,
+    {
+        let unit = |one: f64| if accessor.normalized() { one } else { 1.0 };
+        self.scaled(accessor, dimensions, field, unit)
+    }
+
+    /// As [`Source::vectors`], of attributes whose integers are fractions in any case.
+    pub(super) fn fractions<const N: usize>(
+        &self,
+        accessor: &Accessor,
+        dimensions: Dimensions,
+        field: &str,
+    ) -> Result<Vec<[f64; N]>, SceneError>
+    where
+        [i8; N]: Item,
+        [u8; N]: Item,
+        [i16; N]: Item,
+        [u16; N]: Item,
+        [f32; N]: Item,
+    {
+        self.scaled(accessor, dimensions, field, |one| one)
+    }
+
+    /// Integers over what `unit` makes of the largest value of their type.
+    fn scaled<const N: usize>(
+        &self,
+        accessor: &Accessor,
+        dimensions: Dimensions,
+        field: &str,
+        unit: impl Fn(f64) -> f64,
+    ) -> Result<Vec<[f64; N]>, SceneError>
+    where
+        [i8; N]: Item,
+        [u8; N]: Item,
+        [i16; N]: Item,
+        [u16; N]: Item,
+        [f32; N]: Item,
+    {
+        fn over<T: Copy + Into<f64>, const N: usize>(rows: &[[T; N]], one: f64) -> Vec<[f64; N]> {
+            // -128 and -32768 stand for -1 too.
+            let least = if one == 1.0 { f64::MIN } else { -1.0 };
+            rows.iter().map(|row| row.map(|v| (v.into() / one).max(least))).collect()
+        }
+        let kind = accessor.data_type();
+        Ok(match kind {
+            DataType::I8 => over(&self.items::<[i8; N]>(accessor, (kind, dimensions), field)?, unit(127.0)),
+            DataType::U8 => over(&self.items::<[u8; N]>(accessor, (kind, dimensions), field)?, unit(255.0)),
+            DataType::I16 => {
+                over(&self.items::<[i16; N]>(accessor, (kind, dimensions), field)?, unit(32767.0))
+            }
+            DataType::U16 => {
+                over(&self.items::<[u16; N]>(accessor, (kind, dimensions), field)?, unit(65535.0))
+            }
+            _ => over(&self.items::<[f32; N]>(accessor, (DataType::F32, dimensions), field)?, 1.0),
+        })
     }
 
     /// A list of 4x4 matrices.

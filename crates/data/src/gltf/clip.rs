@@ -4,7 +4,7 @@ use super::buffers::Source;
 use super::{Joints, Rig, unit};
 use crate::SourceDigest;
 use crate::digest::Fingerprint;
-use ::gltf::accessor::{DataType, Dimensions, Item};
+use ::gltf::accessor::{DataType, Dimensions};
 use ::gltf::animation::{Channel as GltfChannel, Interpolation, Property};
 use glam::{DQuat, DVec3, DVec4};
 use skinsplat_core::math::portable;
@@ -198,26 +198,6 @@ fn channel(source: &Source, channel: &GltfChannel, node: usize, field: &str) -> 
 
 /// Quaternions (x, y, z, w), as floats or normalised integers.
 fn rotations(source: &Source, accessor: &::gltf::Accessor, field: &str) -> Result<Vec<DVec4>, SceneError> {
-    fn read<T: Copy>(
-        source: &Source,
-        accessor: &::gltf::Accessor,
-        kind: DataType,
-        field: &str,
-        scale: impl Fn(T) -> f64,
-    ) -> Result<Vec<DVec4>, SceneError>
-    where
-        [T; 4]: Item,
-    {
-        let values: Vec<[T; 4]> = source.items(accessor, (kind, Dimensions::Vec4), field)?;
-        Ok(values.iter().map(|v| DVec4::from_array(v.map(&scale))).collect())
-    }
-    match accessor.data_type() {
-        kind @ DataType::I8 => read(source, accessor, kind, field, |v: i8| (f64::from(v) / 127.0).max(-1.0)),
-        kind @ DataType::U8 => read(source, accessor, kind, field, |v: u8| f64::from(v) / 255.0),
-        kind @ DataType::I16 => {
-            read(source, accessor, kind, field, |v: i16| (f64::from(v) / 32767.0).max(-1.0))
-        }
-        kind @ DataType::U16 => read(source, accessor, kind, field, |v: u16| f64::from(v) / 65535.0),
-        _ => read(source, accessor, DataType::F32, field, |v: f32| f64::from(v)),
-    }
+    let values = source.fractions::<4>(accessor, Dimensions::Vec4, field)?;
+    Ok(values.into_iter().map(DVec4::from_array).collect())
 }

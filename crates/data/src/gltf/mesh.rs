@@ -15,7 +15,8 @@ pub(super) struct Mesh {
     pub(super) uv: Option<Uv>,
 }
 
-pub(super) fn collect(source: &Source, joints: &Joints) -> Result<Mesh, SceneError> {
+/// All skinned primitives, one after the other. A mesh that many nodes show may not grow beyond what the file could hold.
+pub(super) fn collect(source: &Source, joints: &Joints, notes: &mut Vec<String>) -> Result<Mesh, SceneError> {
     let mut vertices = Vec::new();
     let mut faces = Vec::new();
     let mut rows: Vec<Vec<(usize, f32)>> = Vec::new();
@@ -34,8 +35,16 @@ pub(super) fn collect(source: &Source, joints: &Joints) -> Result<Mesh, SceneErr
                 part.faces(positions.len())?.iter().map(|face| face.map(|k| k.saturating_add(first))),
             );
             coordinates.extend(part.texture_coordinates(positions.len())?);
-            rows.extend(part.influences(&skin, joints, positions.len())?);
+            rows.extend(part.influences(&skin, joints, positions.len(), notes)?);
             vertices.extend(positions);
+            if vertices.len() > source.size {
+                let problem = format!("{} vertices of a file of {} bytes", vertices.len(), source.size);
+                return Err(SceneError::new(
+                    part.field,
+                    problem,
+                    "nodes that do not repeat a mesh over and over",
+                ));
+            }
         }
     }
     let uv = (coordinates.len() == vertices.len()).then(|| Uv { coordinates, faces: faces.clone() });
@@ -55,13 +64,17 @@ impl Part<'_> {
         Some((accessor, format!("{}.{}", self.field, semantic.to_string())))
     }
 
+    /// Floats, or integers of 8 and 16 bits, normalised or not (KHR_mesh_quantization).
     fn positions(&self) -> Result<Vec<DVec3>, SceneError> {
         let Some((accessor, field)) = self.attribute(&Semantic::Positions) else {
             return Err(SceneError::new(format!("{}.POSITION", self.field), "missing", "vertex positions"));
         };
-        let positions: Vec<[f32; 3]> =
-            self.source.items(&accessor, (DataType::F32, Dimensions::Vec3), &field)?;
-        Ok(positions.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect())
+        Ok(self
+            .source
+            .vectors::<3>(&accessor, Dimensions::Vec3, &field)?
+            .into_iter()
+            .map(DVec3::from)
+            .collect())
     }
 
     fn faces(&self, vertices: usize) -> Result<Vec<[u32; 3]>, SceneError> {
@@ -98,9 +111,9 @@ impl Part<'_> {
     /// TEXCOORD_0 in OBJ convention (v up; glTF's runs down); none if the primitive has none.
     fn texture_coordinates(&self, vertices: usize) -> Result<Vec<[f32; 2]>, SceneError> {
         let Some((accessor, field)) = self.attribute(&Semantic::TexCoords(0)) else { return Ok(Vec::new()) };
-        let values = self.normalised::<2>(&accessor, Dimensions::Vec2, &field)?;
+        let values = self.source.vectors::<2>(&accessor, Dimensions::Vec2, &field)?;
         same_count(&field, values.len(), vertices)?;
-        Ok(values.iter().map(|[u, v]| [*u, 1.0 - v]).collect())
+        Ok(values.iter().map(|[u, v]| [*u as f32, 1.0 - *v as f32]).collect())
     }
 
     /// JOINTS_n and WEIGHTS_n for n = 0, 1, …, with the skin's joint numbers replaced by the skeleton's.
@@ -109,9 +122,11 @@ impl Part<'_> {
         skin: &Skin,
         joints: &Joints,
         vertices: usize,
+        notes: &mut Vec<String>,
     ) -> Result<Vec<Vec<(usize, f32)>>, SceneError> {
         let skeleton: Vec<Option<usize>> = skin.joints().map(|node| joints.index_of(&node)).collect();
         let mut rows = vec![Vec::new(); vertices];
+        let mut first_joints = Vec::new();
         for set in 0.. {
             let joints = self.attribute(&Semantic::Joints(set));
             let weights = self.attribute(&Semantic::Weights(set));
@@ -131,9 +146,14 @@ impl Part<'_> {
                 }
                 _ => self.source.items(&joints, (DataType::U16, Dimensions::Vec4), &joints_field)?,
             };
-            let weights = self.normalised::<4>(&weights, Dimensions::Vec4, &weights_field)?;
+            let weights = self.source.fractions::<4>(&weights, Dimensions::Vec4, &weights_field)?;
+            let weights: Vec<[f32; 4]> = weights.iter().map(|row| row.map(|w| w as f32)).collect();
             same_count(&joints_field, indices.len(), vertices)?;
             same_count(&weights_field, weights.len(), vertices)?;
+            if set == 0 {
+                first_joints =
+                    indices.iter().map(|row| skeleton.get(usize::from(row[0])).copied().flatten()).collect();
+            }
             for (i, (row, (indices, weights))) in
                 rows.iter_mut().zip(indices.iter().zip(&weights)).enumerate()
             {
@@ -150,32 +170,44 @@ impl Part<'_> {
                 }
             }
         }
+        self.repair(&mut rows, &first_joints, notes)?;
         Ok(rows)
     }
 
-    /// Floats, or 8 or 16 bit integers that stand for \[0, 1\].
-    fn normalised<const N: usize>(
+    /// Rows without weights hang on the first joint that they name, as three.js has it; sums that are off by a little are
+    /// made one.
+    fn repair(
         &self,
-        accessor: &Accessor,
-        dimensions: Dimensions,
-        field: &str,
-    ) -> Result<Vec<[f32; N]>, SceneError>
-    where
-        [f32; N]: ::gltf::accessor::Item,
-        [u8; N]: ::gltf::accessor::Item,
-        [u16; N]: ::gltf::accessor::Item,
-    {
-        match accessor.data_type() {
-            DataType::U8 => {
-                let values: Vec<[u8; N]> = self.source.items(accessor, (DataType::U8, dimensions), field)?;
-                Ok(values.iter().map(|row| row.map(|v| f32::from(v) / 255.0)).collect())
+        rows: &mut [Vec<(usize, f32)>],
+        first_joints: &[Option<usize>],
+        notes: &mut Vec<String>,
+    ) -> Result<(), SceneError> {
+        let mut empty = 0;
+        for (row, first) in rows.iter_mut().zip(first_joints) {
+            if let (true, Some(joint)) = (row.is_empty(), first) {
+                row.push((*joint, 1.0));
+                empty += 1;
             }
-            DataType::U16 => {
-                let values: Vec<[u16; N]> =
-                    self.source.items(accessor, (DataType::U16, dimensions), field)?;
-                Ok(values.iter().map(|row| row.map(|v| f32::from(v) / 65535.0)).collect())
+        }
+        if empty > 0 {
+            let count = rows.len();
+            notes.push(format!(
+                "{}: {empty} of {count} vertices have no weights and hang on the first joint that they name",
+                self.field
+            ));
+        }
+        notes.extend(SkinWeights::normalise(rows).map(|note| format!("{}: {note}", self.field)));
+        let sum = |row: &Vec<(usize, f32)>| row.iter().map(|(_, w)| f64::from(*w)).sum::<f64>();
+        let off = |row: &Vec<(usize, f32)>| {
+            let sum = sum(row);
+            sum.is_nan() || (sum - 1.0).abs() > SkinWeights::SUM_TOLERANCE
+        };
+        match rows.iter().position(off) {
+            Some(i) => {
+                let field = format!("{}.WEIGHTS_0[{i}]", self.field);
+                Err(SceneError::new(field, format!("sum {}", sum(&rows[i])), "weights that sum to 1"))
             }
-            _ => self.source.items(accessor, (DataType::F32, dimensions), field),
+            None => Ok(()),
         }
     }
 }

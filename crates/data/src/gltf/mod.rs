@@ -4,6 +4,7 @@
 mod buffers;
 mod clip;
 mod mesh;
+mod text;
 
 pub use clip::Clip;
 
@@ -22,19 +23,23 @@ pub struct Rig {
     pub body: Body,
     /// Its animations.
     pub clips: Vec<Clip>,
+    /// What was repaired or not read, a clause each.
+    pub notes: Vec<String>,
 }
 
 impl Rig {
     /// Loads a `.glb` or `.gltf` file, with its external buffers or data URIs. All meshes with a skin become one body,
-    /// in the order of nodes and primitives.
+    /// in the order of nodes and primitives. Weights that sum to 0.97 to 1.03 are divided by their sum, vertices without
+    /// weights hang on the first joint that they name, and channels without a node are ignored; the notes say so.
     ///
     /// # Errors
-    /// An invalid document, buffers or accessors that are missing or too short, no skinned mesh, weights that do not
-    /// sum to one, a node hierarchy that is no forest.
+    /// An invalid document, compressed geometry, buffers or accessors that are missing or too short, a buffer that is no
+    /// regular file of the document's folder, no skinned mesh, weights of another sum, a node hierarchy that is no forest.
     pub fn load(path: &Path) -> Result<Self, Error> {
         let source = Source::open(path)?;
         let joints = Joints::collect(&source).map_err(|e| Error::scene(path, e))?;
-        let mesh = mesh::collect(&source, &joints).map_err(|e| Error::scene(path, e))?;
+        let mut notes = source.notes.clone();
+        let mesh = mesh::collect(&source, &joints, &mut notes).map_err(|e| Error::scene(path, e))?;
         let clips = clip::collect(&source, &joints).map_err(|e| Error::scene(path, e))?;
         let skeleton = joints.skeleton().map_err(|e| Error::scene(path, e))?;
         let rest = RestBody {
@@ -46,7 +51,7 @@ impl Rig {
             pose_directions: Vec::new(),
         };
         rest.validate().map_err(|e| Error::scene(path, e))?;
-        Ok(Self { body: Body { rest, shape: None }, clips })
+        Ok(Self { body: Body { rest, shape: None }, clips, notes })
     }
 }
 

@@ -1,9 +1,21 @@
 //! How data sets are stored: a layout is a file here and a line in [`LAYOUTS`].
 
+mod aligned;
+mod colmap;
+mod distortion;
+mod galabasketball;
+mod neuman;
 mod peoplesnapshot;
+mod snapshot_raw;
+mod split;
+mod surface;
+mod unity;
+mod video;
+mod xhumans;
 
-use super::Error;
 use super::folder::{Options, Subject};
+use super::{Capture, Error, Sequence, listing};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -37,6 +49,10 @@ pub const LAYOUTS: &[Layout] = &[
         load: |request| Subject::load(request.folder, request.options),
     },
     peoplesnapshot::LAYOUT,
+    snapshot_raw::LAYOUT,
+    neuman::LAYOUT,
+    xhumans::LAYOUT,
+    galabasketball::LAYOUT,
 ];
 
 impl Layout {
@@ -46,7 +62,7 @@ impl Layout {
     }
 }
 
-/// Which video frames are trained on and which are held out.
+/// Which points in time are trained on and which are held out: frames of the video, counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Split {
@@ -57,15 +73,21 @@ pub struct Split {
 }
 
 impl Request<'_> {
-    /// The split of a layout that does not bring its own.
-    ///
-    /// # Errors
-    /// If the registry has none for the subject.
-    pub fn required_split(&self) -> Result<&Split, Error> {
-        let name = self.folder.file_name().unwrap_or_default().to_string_lossy();
-        let expected = "splits.<subject> = { train = [first, last, step], test = ... }";
-        self.split.ok_or_else(|| Error::invalid(self.folder, format!("splits.{name}"), "missing", expected))
+    /// A subject of this folder.
+    fn subject(
+        &self,
+        capture: Capture,
+        train: Vec<Sequence>,
+        test: Vec<Sequence>,
+        notes: Vec<String>,
+    ) -> Subject {
+        Subject { id: listing::file_name(self.folder), capture, train, test, notes }
     }
+}
+
+/// Triples of a row of numbers.
+fn triples(values: &[f64]) -> Vec<DVec3> {
+    values.chunks_exact(3).map(DVec3::from_slice).collect()
 }
 
 #[cfg(test)]

@@ -9,6 +9,9 @@
 //! | vertex | `joint_0 …` (uint) and `weight_0 …` (float), padded with zeros to the longest row |
 //! | face | `face` (uint), `bary_0 bary_1 bary_2` (float), `offset` (float, metres along the normal) |
 //!
+//! Two more kinds of file are told apart by what they hold ([`Dialect`]): SuperSplat's compressed PLY, and iHuman's, whose
+//! values are activated.
+//!
 //! A tool that filters vertices keeps the binding aligned with them. Comments say what the file is; they stand after the
 //! properties, since viewers exist that expect `element vertex` in the third line.
 //!
@@ -16,12 +19,16 @@
 //! row), while the properties of a splat are known only from the header (SH degree, influences, what other tools add). A
 //! column here is an offset, which is also no slower.
 
+mod activated;
+mod compressed;
 mod header;
 mod read;
+mod rows;
 mod write;
 
+pub(crate) use activated::logit;
 pub use header::Encoding;
-pub use read::{Stored, read, read_avatar};
+pub use read::{Dialect, Stored, read, read_avatar};
 pub use write::{Metadata, write_avatar};
 
 /// Coefficients of `f_rest` for SH degrees 0 to 3.

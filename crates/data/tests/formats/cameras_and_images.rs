@@ -118,7 +118,9 @@ fn every_kind_of_png_is_read_as_straight_values() {
     assert_eq!(load(rgb16), (vec![[f32::from(0x1234u16) / 65535.0, 1.0 / 65535.0, 1.0]], None));
     let grey = png(folder.path(), "grey.png", kind(8, 0), 2, &[7, 8]);
     assert_eq!(load(grey.clone()), (vec![[of(7.); 3], [of(8.); 3]], None));
-    assert_eq!(frames::load_mask(&grey).unwrap().values(), [of(7.), of(8.)]);
+    assert_eq!(frames::load_mask(&grey).unwrap_err().field(), "mask", "8 of 255 is a label");
+    let mask = png(folder.path(), "mask.png", kind(8, 0), 2, &[7, 80]);
+    assert_eq!(frames::load_mask(&mask).unwrap().values(), [of(7.), of(80.)]);
     let bits = png(folder.path(), "bits.png", kind(1, 0), 8, &[0b1010_0000]);
     assert_eq!(frames::load_mask(&bits).unwrap().values(), [1., 0., 1., 0., 0., 0., 0., 0.]);
     let grey_alpha = png(folder.path(), "grey_alpha.png", kind(8, 4), 1, &[9, 128]);

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use skinsplat_core::scene::{Avatar, Binding, Gaussians};
-use skinsplat_data::avatar::{Format, file_digest, mesh_beside, read_avatar};
+use skinsplat_data::avatar::{Canonical, Format, file_digest, mesh_beside, read_avatar};
 use skinsplat_data::ply::{self, Encoding, Metadata};
 use skinsplat_data::splatting_avatar;
 use std::path::Path;
@@ -44,6 +44,30 @@ fn geometry_comes_from_the_embedding_and_appearance_from_the_ply() {
     assert_eq!((&binding.faces[..], &binding.offsets[..]), (&[1, 0][..], &[0.5, -0.25][..]));
 }
 
+/// Names as other machines and later versions write them.
+#[test]
+fn the_mesh_is_found_by_a_relative_name_an_absolute_one_and_a_later_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = export(folder.path(), EMBEDDING, MESH);
+    let expected = splatting_avatar::load(&path).unwrap();
+    std::fs::create_dir(folder.path().join("mesh")).unwrap();
+    std::fs::write(folder.path().join("mesh/cano.obj"), MESH).unwrap();
+    let renamed = EMBEDDING.replace("cano_mesh", "mesh_fn").replace("sample_bary", "_sample_bary");
+    for (name, file) in [
+        ("mesh/cano.obj", "mesh/cano.obj"),
+        ("/home/neil/avatars/embedding.obj", "embedding.obj"),
+        ("D:\\\\runs\\\\embedding.obj", "embedding.obj"),
+        ("../../embedding.obj", "embedding.obj"),
+    ] {
+        for text in [EMBEDDING, &renamed] {
+            let path = export(folder.path(), &text.replace("embedding.obj", name), MESH);
+            let loaded = splatting_avatar::load(&path).unwrap();
+            assert_eq!(loaded.avatar, expected.avatar, "{name}");
+            assert_eq!(loaded.files[2], folder.path().join(file), "{name}");
+        }
+    }
+}
+
 #[test]
 fn what_is_wrong_with_an_export_is_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -76,7 +100,7 @@ fn formats_are_told_apart_by_what_is_there() {
             (loaded.format, loaded.is_bound(), loaded.files.len()),
             (Format::SplattingAvatar, true, 3)
         );
-        assert!(loaded.canonical.is_some() && loaded.notes.len() == 1);
+        assert!(matches!(loaded.canonical, Canonical::Mesh(_)) && loaded.notes.len() == 1);
     }
     let exported = read_avatar(&path).unwrap().digest().unwrap();
     std::fs::remove_file(folder.path().join("embedding.json")).unwrap();

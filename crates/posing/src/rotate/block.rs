@@ -1,6 +1,6 @@
 //! A block of Gaussians: what a rotation reads, and what it answers.
 
-use super::super::blend::Blend;
+use super::super::blend::{self, Blend};
 use super::super::joints::Joints;
 use super::super::lanes::{LANES, Lanes, put};
 use super::super::layout::{Block, Chunk};
@@ -33,6 +33,20 @@ impl BlockInput<'_> {
     pub(crate) fn average_of(&self, lane: usize) -> Quaternion<f32> {
         let (indices, weights) = self.chunk.influences(self.block);
         average::of_lane(self.joints, indices, weights, lane, Solver::ClosedForm)
+    }
+
+    /// By how much the Gaussians of the block grow with their joints; `None` if no joint scales.
+    pub(crate) fn growth(&self) -> Option<Lanes> {
+        let scales = self.joints.scale.as_deref()?;
+        let (indices, weights) = self.chunk.influences(self.block);
+        Some(blend::growth(scales, indices, weights))
+    }
+
+    /// Σ w_j R_j, row-major, where the joints also scale; else it is the blended matrix, and `None`.
+    pub(crate) fn blended_rotations(&self) -> Option<[Lanes; 9]> {
+        let matrices = self.joints.rotation_matrix.as_deref().filter(|_| self.joints.scale.is_some())?;
+        let (indices, weights) = self.chunk.influences(self.block);
+        Some(blend::rotations(matrices, indices, weights))
     }
 
     /// Index of a lane's Gaussian.

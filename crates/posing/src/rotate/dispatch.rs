@@ -26,7 +26,10 @@ pub(crate) fn rotate(arch: pulp::Arch, source: &Source<'_>, input: &BlockInput<'
         }
         Source::Dual => {
             let motions = dual::blend(input.joints, indices, weights);
-            means = Some(motions.transform(&input.block.means));
+            means = Some(match input.growth() {
+                None => motions.transform(&input.block.means),
+                Some(growth) => motions.transform(&scaled(&input.block.means, &growth)),
+            });
             motions.real
         }
         Source::Faces(faces) => faces.of_block(input),
@@ -63,9 +66,15 @@ pub(crate) fn rotation_adjoint(
     }
 }
 
-/// The derivatives with respect to the canonical means where [`Rotated::means`] takes the place of Eq. 6: Rᵀ g.
+/// Each lane of three axes times its factor.
+fn scaled(axes: &[Lanes; 3], factors: &Lanes) -> [Lanes; 3] {
+    axes.map(|axis| std::array::from_fn(|lane| axis[lane] * factors[lane]))
+}
+
+/// The derivatives with respect to the canonical means where [`Rotated::means`] takes the place of Eq. 6: Rᵀ g, times the
+/// growth of joints that scale.
 #[inline(always)]
-pub(crate) fn means_adjoint(rotated: &Rotated, gradient: &[Lanes; 3]) -> [Lanes; 3] {
+pub(crate) fn means_adjoint(input: &BlockInput<'_>, rotated: &Rotated, gradient: &[Lanes; 3]) -> [Lanes; 3] {
     let mut means = [[0.0; LANES]; 3];
     for lane in 0..LANES {
         let back = rotation::quaternion_to_matrix_raw(rotation::conjugate(take(&rotated.relative, lane)));
@@ -75,5 +84,8 @@ pub(crate) fn means_adjoint(rotated: &Rotated, gradient: &[Lanes; 3]) -> [Lanes;
                 + back[axis][2] * gradient[2][lane];
         }
     }
-    means
+    match input.growth() {
+        None => means,
+        Some(growth) => scaled(&means, &growth),
+    }
 }

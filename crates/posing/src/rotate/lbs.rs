@@ -59,12 +59,14 @@ pub(super) fn projected(projection: LbsProjection, input: &BlockInput<'_>) -> [L
     relative
 }
 
-/// PyTorch3D's quaternion of B R_c, raw or normalised: the posed quaternion itself.
+/// PyTorch3D's quaternion of B R_c, raw or normalised: the posed quaternion itself. Where joints scale, B is the blend of
+/// their rotations: HUGS converts before it scales.
 #[inline(never)]
 pub(super) fn converted(arch: pulp::Arch, projection: LbsProjection, input: &BlockInput<'_>) -> Rotated {
     let canonical = &input.block.rotations;
-    let Conversion { raw, mut unit, usual, .. } =
-        arch.dispatch(Convert { blend: &input.blend.linear, canonical });
+    let rotations = input.blended_rotations();
+    let blend = rotations.as_ref().unwrap_or(&input.blend.linear);
+    let Conversion { raw, mut unit, usual, .. } = arch.dispatch(Convert { blend, canonical });
     if !usual {
         for lane in 0..LANES {
             let own = rotation::normalize(take(&raw, lane));
@@ -135,15 +137,17 @@ pub(super) fn converted_adjoint(
     torque: Option<&[Lanes; 3]>,
 ) -> [Lanes; 4] {
     let raw_is_drawn = projection == LbsProjection::MatrixToQuaternionRaw;
+    let rotations = input.blended_rotations();
+    let blend = rotations.as_ref().unwrap_or(&input.blend.linear);
     if torque.is_none() {
-        let convert = Convert { blend: &input.blend.linear, canonical: &input.block.rotations };
+        let convert = Convert { blend, canonical: &input.block.rotations };
         if let Some(result) = arch.dispatch(ConvertAdjoint { convert, raw_is_drawn, posed }) {
             return result;
         }
     }
     let mut result = [[0.0; LANES]; 4];
     for lane in 0..LANES {
-        let (b, canonical) = (input.blend.matrix(lane), take(&input.block.rotations, lane));
+        let (b, canonical) = (matrix(blend, lane), take(&input.block.rotations, lane));
         let torque = torque
             .map(|torque| ([0, 1, 2].map(|axis: usize| torque[axis][lane]), take(&rotated.relative, lane)));
         let of_lane = lane_adjoint(raw_is_drawn, b, canonical, take(posed, lane), torque);

@@ -171,21 +171,25 @@ pub struct VisibleFaces {
 
 impl VisibleFaces {
     /// Width in pixels.
+    #[inline]
     pub fn width(&self) -> usize {
         self.width
     }
 
     /// Height in pixels.
+    #[inline]
     pub fn height(&self) -> usize {
         self.height
     }
 
     /// The nearest face at the centre of pixel (x, y).
+    #[inline]
     pub fn face(&self, x: usize, y: usize) -> Option<u32> {
         self.pixels[y * self.width + x].map(|(face, _)| face)
     }
 
     /// Camera depth of that face at the centre of pixel (x, y), metres; infinite where nothing is seen.
+    #[inline]
     pub fn depth(&self, x: usize, y: usize) -> f32 {
         self.pixels[y * self.width + x].map_or(f32::INFINITY, |(_, depth)| depth)
     }

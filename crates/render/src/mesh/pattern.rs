@@ -21,6 +21,7 @@ impl SamplePattern {
 
     /// Samples per pixel.
     #[expect(clippy::len_without_is_empty, reason = "a pattern is never empty")]
+    #[inline]
     pub fn len(self) -> usize {
         self.per_axis * self.per_axis
     }

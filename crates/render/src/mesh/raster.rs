@@ -109,6 +109,7 @@ impl<'a> PixelSamples<'a> {
     }
 
     /// The fragment at each covered sample.
+    #[inline]
     pub(super) fn fragments(self) -> impl Iterator<Item = Fragment> + 'a {
         let covered = self.nearest.iter().zip(&self.scene.samples).filter(|(t, _)| **t != NONE);
         covered.map(move |(&t, &sample)| self.fragment(&self.scene.triangles[t as usize], sample))

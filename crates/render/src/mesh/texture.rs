@@ -17,6 +17,7 @@ impl Texture {
     }
 
     /// The image, first row at the top (v = 1).
+    #[inline]
     pub fn image(&self) -> &Image {
         &self.texels
     }
@@ -27,6 +28,7 @@ impl Texture {
     }
 
     /// The bilinearly interpolated texel at (u, v). A NaN reads the left or the top border.
+    #[inline]
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 3] {
         let mix = Bilinear::at(uv, [self.texels.width(), self.texels.height()]);
         let Bilinear { columns: [left, right], rows: [top, bottom], fraction: [fx, fy] } = mix;

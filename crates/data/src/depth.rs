@@ -1,0 +1,65 @@
+//! Depth maps: TIFF files of one channel of floats.
+
+use super::Error;
+use skinsplat_core::scene::camera;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+use tiff::ColorType;
+use tiff::decoder::{Decoder, DecodingResult};
+
+/// No compressed image expands by more than this (deflate reaches 1032).
+const MAX_EXPANSION: u64 = 1100;
+
+/// Depths of a picture, row by row, in the unit of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Depth {
+    /// Pixels of a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// One value per pixel.
+    pub values: Vec<f32>,
+}
+
+/// Loads the first page of a TIFF file: one channel of 32 or 64 bit floats or of 16 bit integers.
+///
+/// # Errors
+/// Unreadable, truncated or absurdly large files, other pixel types, NaN.
+pub fn load(path: &Path) -> Result<Depth, Error> {
+    const EXPECTED: &str = "a TIFF file with one channel of floats";
+    let broken = |cause: tiff::TiffError| Error::invalid(path, "depth", one_line(&cause), EXPECTED);
+    let file = File::open(path).map_err(|cause| Error::read(path, "depth", EXPECTED, cause))?;
+    let length = file.metadata().map_err(|cause| Error::read(path, "depth", EXPECTED, cause))?.len();
+    let mut decoder = Decoder::new(BufReader::new(file)).map_err(broken)?;
+    let (width, height) = decoder.dimensions().map_err(broken)?;
+    camera::check_image_size(width, height).map_err(|e| Error::scene(path, e))?;
+    let kind = decoder.colortype().map_err(broken)?;
+    let ColorType::Gray(bits) = kind else {
+        return Err(Error::invalid(path, "depth", format!("pixel type {kind:?}"), EXPECTED));
+    };
+    let size = u64::from(width) * u64::from(height) * u64::from(bits) / 8;
+    if size > length.saturating_mul(MAX_EXPANSION) {
+        let problem = format!("{width}x{height} pixels in {length} bytes");
+        return Err(Error::invalid(path, "depth size", problem, "a size that the file can hold"));
+    }
+    let values: Vec<f32> = match decoder.read_image().map_err(broken)? {
+        DecodingResult::F32(values) => values,
+        DecodingResult::F64(values) => values.into_iter().map(|v| v as f32).collect(),
+        DecodingResult::U16(values) => values.into_iter().map(f32::from).collect(),
+        _ => return Err(Error::invalid(path, "depth", format!("pixel type {kind:?}"), EXPECTED)),
+    };
+    let (width, height) = (width as usize, height as usize);
+    if values.len() != width * height {
+        let problem = format!("{} values", values.len());
+        return Err(Error::invalid(path, "depth", problem, format!("{width}x{height}")));
+    }
+    if let Some(i) = values.iter().position(|v| v.is_nan()) {
+        return Err(Error::invalid(path, format!("depth[{i}]"), "NaN", "metres"));
+    }
+    Ok(Depth { width, height, values })
+}
+
+fn one_line(cause: &tiff::TiffError) -> String {
+    cause.to_string().replace('\n', " ")
+}

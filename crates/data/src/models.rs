@@ -1,0 +1,265 @@
+//! The body models of a subject: which file it is, loaded once, and the shapes of it that sequences share.
+
+use super::folder::Options;
+use super::poses::PoseTrack;
+use super::{Error, body, listing, npy};
+use skinsplat_core::scene::{Body, RestBody};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Which of the bodies of a family a subject has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Gender {
+    Female,
+    Male,
+    Neutral,
+}
+
+/// The families of bodies that data sets name without naming a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Family {
+    /// 24 joints.
+    Smpl,
+    /// 55 joints: with jaw, eyes and fingers.
+    Smplx,
+}
+
+impl Gender {
+    /// The gender of this name, in any case.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        match name.trim().to_ascii_lowercase().as_str() {
+            "female" | "f" => Some(Self::Female),
+            "male" | "m" => Some(Self::Male),
+            "neutral" | "n" => Some(Self::Neutral),
+            _ => None,
+        }
+    }
+
+    /// The gender that a folder's name tells ("female-3-casual").
+    pub(crate) fn in_name(name: &str) -> Option<Self> {
+        let words = name.split(|c: char| !c.is_ascii_alphabetic());
+        words.filter(|word| word.len() > 1).find_map(Self::named)
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Female => "female",
+            Self::Male => "male",
+            Self::Neutral => "neutral",
+        }
+    }
+}
+
+impl Family {
+    /// File names without extension, as the models are distributed.
+    fn file_stems(self, gender: Gender) -> Vec<String> {
+        let word = gender.word();
+        let upper = word.to_ascii_uppercase();
+        match self {
+            Self::Smplx => vec![format!("SMPLX_{upper}")],
+            Self::Smpl => {
+                let letter = if gender == Gender::Neutral { word } else { &word[..1] };
+                let original = |name: &str, version: &str| format!("{name}_{letter}_lbs_10_207_0_{version}");
+                vec![
+                    format!("SMPL_{upper}"),
+                    original("basicModel", "v1.0.0"),
+                    original("basicmodel", "v1.0.0"),
+                    original("basicmodel", "v1.1.0"),
+                ]
+            }
+        }
+    }
+}
+
+/// Body models that were loaded for a subject, and the shapes of them that its sequences share.
+pub(crate) struct Models<'a> {
+    subject: &'a Path,
+    options: &'a Options,
+    loaded: BTreeMap<PathBuf, Model>,
+    notes: Vec<String>,
+}
+
+struct Model {
+    body: Body,
+    /// By betas and expression.
+    shapes: Vec<([Vec<f64>; 2], Arc<RestBody>)>,
+}
+
+impl<'a> Models<'a> {
+    pub(crate) fn new(subject: &'a Path, options: &'a Options) -> Self {
+        Self { subject, options, loaded: BTreeMap::new(), notes: Vec::new() }
+    }
+
+    /// What has to be said of the models and of the shapes that were asked for, each once and with its file.
+    pub(crate) fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn note(&mut self, path: &Path, note: &str) {
+        let note = format!("{}: {note}", path.display());
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// The body in the shape and with the expression of a track, which `source` holds; `name` is the file that it names. What
+    /// the body makes of the track is noted.
+    pub(crate) fn of_track(
+        &mut self,
+        source: &Path,
+        name: Option<&str>,
+        track: &PoseTrack,
+    ) -> Result<Arc<RestBody>, Error> {
+        let path = self.find(source, name)?;
+        self.posed(source, &path, track)
+    }
+
+    /// As [`Models::of_track`], of the model that is told by family and gender.
+    pub(crate) fn of_person(
+        &mut self,
+        source: &Path,
+        family: Family,
+        gender: Gender,
+        track: &PoseTrack,
+    ) -> Result<Arc<RestBody>, Error> {
+        let path = self.path_of(source, family, gender)?;
+        let body = self.posed(source, &path, track)?;
+        // A model that was given may be another's.
+        if let Some(other) = Gender::in_name(&listing::stem(&path)).filter(|own| *own != gender) {
+            self.note(&path, &format!("a {} body; the subject is {}", other.word(), gender.word()));
+        }
+        Ok(body)
+    }
+
+    fn posed(&mut self, source: &Path, path: &Path, track: &PoseTrack) -> Result<Arc<RestBody>, Error> {
+        let body = self.shaped(source, path, &track.betas, &track.expression)?;
+        track.notes_for(&body.skeleton).iter().for_each(|note| self.note(source, note));
+        Ok(body)
+    }
+
+    /// The file of the model that is told by family and gender: the given file; else in the given folder, or in `models` of
+    /// the subject's folder or of one of the two above it, one of the names under which the models are distributed.
+    pub(crate) fn path_of(&self, source: &Path, family: Family, gender: Gender) -> Result<PathBuf, Error> {
+        let stems = family.file_stems(gender);
+        let folders = match &self.options.model {
+            Some(model) if model.is_dir() => vec![model.clone()],
+            Some(model) => return Ok(model.clone()),
+            None => self.places(),
+        };
+        let below = |folder: &PathBuf| ["", "smpl", "smplx"].map(|name| folder.join(name));
+        let files = folders.iter().flat_map(below).flat_map(|folder| {
+            stems
+                .iter()
+                .flat_map(move |stem| ["npz", "pkl"].map(|end| folder.join(format!("{stem}.{end}"))))
+                .collect::<Vec<_>>()
+        });
+        files.into_iter().find(|path| path.is_file()).ok_or_else(|| {
+            let place = match &self.options.model {
+                Some(model) => model.display().to_string(),
+                None => "models/ of the subject's folder or of one of the two above it".to_owned(),
+            };
+            let problem = format!("no {} body", gender.word());
+            Error::invalid(source, "model", problem, format!("{}.npz or .pkl in {place}", stems[0]))
+        })
+    }
+
+    fn shaped(
+        &mut self,
+        source: &Path,
+        path: &Path,
+        betas: &[f64],
+        expression: &[f64],
+    ) -> Result<Arc<RestBody>, Error> {
+        if !self.loaded.contains_key(path) {
+            let body::Loaded { body, notes } = body::read(path)?;
+            notes.iter().for_each(|note| self.note(path, note));
+            self.loaded.insert(path.to_owned(), Model { body, shapes: Vec::new() });
+        }
+        let coefficients = [betas, expression].map(<[f64]>::to_vec);
+        let Model { body, shapes } = self.loaded.get_mut(path).expect("inserted above");
+        if let Some((_, rest)) = shapes.iter().find(|(known, _)| *known == coefficients) {
+            return Ok(rest.clone());
+        }
+        let (mut rest, notes) = body::shape(body, betas, expression).map_err(|e| Error::scene(source, e))?;
+        let offsets = self.subject.join("gt_normal_offset.npy");
+        if self.options.clothing && offsets.is_file() {
+            let array = npy::read(&offsets)?;
+            let values: Vec<f32> = array.values.iter().map(|&v| v as f32).collect();
+            rest = rest.with_normal_offset(&values).map_err(|e| Error::scene(&offsets, e))?;
+        }
+        let rest = Arc::new(rest);
+        shapes.push((coefficients, rest.clone()));
+        notes.iter().for_each(|note| self.note(source, note));
+        Ok(rest)
+    }
+
+    /// A given model, or the named one in one of [`Models::places`].
+    fn find(&self, source: &Path, name: Option<&str>) -> Result<PathBuf, Error> {
+        match (&self.options.model, name) {
+            (Some(model), Some(name)) if model.is_dir() => return Ok(model.join(name)),
+            (Some(model), _) => return Ok(model.clone()),
+            (None, _) => {}
+        }
+        let Some(name) = name else {
+            return Err(Error::invalid(source, "model", "missing", "a body model, named here or given"));
+        };
+        self.places().iter().map(|place| place.join(name)).find(|path| path.is_file()).ok_or_else(|| {
+            let expected = "a file in models/ of the subject's folder or of one of the two above it";
+            Error::invalid(source, "model", format!("{name} not found"), expected)
+        })
+    }
+
+    /// `models` of the subject's folder and of the two above it; of a folder that is a link, above either of its ends.
+    fn places(&self) -> Vec<PathBuf> {
+        let beside_link = std::path::absolute(self.subject).unwrap_or_else(|_| self.subject.to_owned());
+        let above_link = beside_link.ancestors().skip(1).take(2).map(Path::to_owned);
+        let above_target = ["..", "../.."].map(|up| self.subject.join(up));
+        let folders = std::iter::once(self.subject.to_owned()).chain(above_link).chain(above_target);
+        folders.map(|folder| folder.join("models")).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn male_is_part_of_female() {
+        for (name, gender) in [
+            ("female-3-casual", Some(Gender::Female)),
+            ("male-4-casual", Some(Gender::Male)),
+            ("SMPL_NEUTRAL.pkl", Some(Gender::Neutral)),
+            ("FEMALE_1", Some(Gender::Female)),
+            ("basicModel_f_lbs", None),
+            ("someone", None),
+        ] {
+            assert_eq!(Gender::in_name(name), gender, "{name}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_linked_subject_finds_models_above_either_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["store/far/subject", "project/data", "project/models", "store/models"] {
+            std::fs::create_dir_all(at(name)).unwrap();
+        }
+        std::os::unix::fs::symlink(at("store/far/subject"), at("project/data/subject")).unwrap();
+        std::fs::write(at("project/models/body.npz"), b"x").unwrap();
+        std::fs::write(at("store/models/SMPL_MALE.npz"), b"x").unwrap();
+        let subject = at("project/data/subject");
+        let options = Options::default();
+        let models = Models::new(&subject, &options);
+        let found = models.find(&subject, Some("body.npz")).unwrap();
+        assert!(found.ends_with("project/models/body.npz"), "{}", found.display());
+        let found = models.path_of(&subject, Family::Smpl, Gender::Male).unwrap();
+        assert!(found.ends_with("SMPL_MALE.npz"), "{}", found.display());
+        let error = models.path_of(&subject, Family::Smpl, Gender::Female).unwrap_err().to_string();
+        assert!(
+            error.contains("model: no female body; expected SMPL_FEMALE.npz or .pkl in models/"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,181 @@
+//! Does a data set fit itself? The posed body, projected into every frame, against the frame's mask.
+//!
+//! What goes wrong when data is prepared shows in the overlap of the two silhouettes: masks the wrong way round, poses that
+//! are shifted against frames, another body or camera. [`sequence`] measures the overlap and names what it finds.
+
+mod findings;
+mod overlays;
+mod shadows;
+
+pub use overlays::write as write_overlays;
+
+use rayon::prelude::*;
+use serde::Serialize;
+use shadows::Shadow;
+use skinsplat_core::scene::{Camera, Mask, PosedBody};
+use skinsplat_data::{Error, Sequence};
+use skinsplat_render::mesh::{Mesh, SamplePattern, silhouette};
+
+/// Longer side at which silhouettes are compared, pixels.
+const SIDE: u32 = 256;
+
+/// What is wrong with a sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Masks that mark the background.
+    InvertedMasks,
+    /// Masks whose values are labels, or 0 and 1 of 255.
+    MaskRange,
+    /// Poses that belong to other frames.
+    FrameOffset,
+    /// Another number of poses than of frames.
+    PoseCount,
+    /// Shape coefficients of another number than the body model's.
+    BetasSize,
+    /// A body of another size than the person.
+    WrongGenderOrModel,
+    /// A focal length or principal point that is far off, or distortion.
+    Camera,
+    /// Images or masks that are not there or cannot be read.
+    MissingFrames,
+    /// A mask without a pixel.
+    EmptyMask,
+    /// A body that the camera does not see.
+    BodyOutOfView,
+}
+
+impl std::fmt::Display for Kind {
+    /// Its id.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.serialize(f)
+    }
+}
+
+impl Kind {
+    /// True if numbers made from such data mean nothing.
+    pub fn spoils(self) -> bool {
+        !matches!(self, Self::EmptyMask | Self::MaskRange | Self::BodyOutOfView | Self::BetasSize)
+    }
+}
+
+/// Something that is wrong, or may be.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// What.
+    pub kind: Kind,
+    /// In which sequence.
+    pub sequence: String,
+    /// Which frames, by how much.
+    pub detail: String,
+    /// True if numbers made from this data mean nothing.
+    pub spoils: bool,
+}
+
+impl Finding {
+    fn new(kind: Kind, sequence: &str, detail: impl Into<String>) -> Self {
+        Self { kind, sequence: sequence.to_owned(), detail: detail.into(), spoils: kind.spoils() }
+    }
+
+    /// The finding behind a subject that cannot be loaded, if there is a kind for it.
+    pub fn of_error(error: &Error) -> Option<Self> {
+        let field = error.field();
+        let is = |words: &[&str]| words.iter().any(|word| field.contains(word));
+        let kind = match field {
+            _ if is(&["poses", "thetas", "body_pose", "global_orient"]) => Kind::PoseCount,
+            _ if is(&["betas", "shapedirs"]) => Kind::BetasSize,
+            _ if is(&["camera", "intrinsic", "extrinsic"]) => Kind::Camera,
+            _ if is(&["mask", "image", "frame", "file_path"]) => Kind::MissingFrames,
+            _ => return None,
+        };
+        Some(Self::new(kind, "", error.to_string()))
+    }
+}
+
+/// How well one frame fits.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FrameFit {
+    /// Name of the frame.
+    pub name: String,
+    /// Intersection over union of the body's silhouette and the mask; none if the frame cannot be read.
+    pub silhouette_iou: Option<f64>,
+}
+
+/// How well a sequence fits.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SequenceFit {
+    /// Id.
+    pub id: String,
+    /// The frames that were looked at.
+    pub frames: Vec<FrameFit>,
+    /// Mean over frames that have an overlap.
+    pub mean_iou: Option<f64>,
+}
+
+/// One frame, at the resolution of the comparison.
+struct Seen {
+    /// Index in its sequence.
+    index: usize,
+    camera: Camera,
+    /// The mask and the body's silhouette, or why there are none.
+    shadows: Result<Shadows, Problem>,
+}
+
+struct Shadows {
+    mask: Shadow,
+    body: Shadow,
+    /// Where the body's root is seen, pixels.
+    root: Option<[f64; 2]>,
+}
+
+struct Problem {
+    kind: Kind,
+    text: String,
+}
+
+/// Compares silhouettes and masks of some frames of a sequence, in their order, and names what is wrong.
+pub fn sequence(sequence: &Sequence, frames: &[usize]) -> (SequenceFit, Vec<Finding>) {
+    let small = sequence.reduced(SIDE);
+    let seen: Vec<Seen> = frames.par_iter().map(|&index| look(&small, index)).collect();
+    let overlap = |seen: &Seen| seen.shadows.as_ref().ok().and_then(|s| s.body.overlap(&s.mask));
+    let frame = |seen: &Seen| FrameFit {
+        name: sequence.frames[seen.index].name.clone(),
+        silhouette_iou: overlap(seen),
+    };
+    let overlaps: Vec<f64> = seen.iter().filter_map(overlap).collect();
+    let mean_iou = (!overlaps.is_empty()).then(|| overlaps.iter().sum::<f64>() / overlaps.len() as f64);
+    let fit = SequenceFit { id: sequence.id.clone(), frames: seen.iter().map(frame).collect(), mean_iou };
+    (fit, findings::of(sequence, &seen))
+}
+
+fn look(small: &Sequence, index: usize) -> Seen {
+    let camera = small.cameras[small.frames[index].camera].clone();
+    let shadows = shadows_of(small, index, &camera);
+    Seen { index, camera, shadows }
+}
+
+fn shadows_of(small: &Sequence, index: usize, camera: &Camera) -> Result<Shadows, Problem> {
+    let unreadable = |text: String| {
+        let labels = text.contains("a map of labels");
+        Problem { kind: if labels { Kind::MaskRange } else { Kind::MissingFrames }, text }
+    };
+    let truth = small.truth(index).map_err(|error| unreadable(error.to_string()))?;
+    let (body, root) = project(small, index, camera).map_err(|error| unreadable(error.to_string()))?;
+    Ok(Shadows { mask: Shadow::of(&truth.alpha), body: Shadow::of(&body), root })
+}
+
+/// The silhouette of the posed body, and where its root is seen.
+fn project(
+    sequence: &Sequence,
+    index: usize,
+    camera: &Camera,
+) -> Result<(Mask, Option<[f64; 2]>), skinsplat_core::scene::SceneError> {
+    let pose = &sequence.poses[sequence.frames[index].pose];
+    let body = PosedBody::new(&sequence.body, pose)?;
+    let mesh = body.mesh();
+    let shadow =
+        silhouette(&Mesh::new(&mesh.vertices, &sequence.body.faces)?, camera, SamplePattern::new(2))?;
+    let count = mesh.vertices.len().max(1) as f64;
+    let centre = mesh.vertices.iter().map(|v| v.as_dvec3()).sum::<glam::DVec3>() / count;
+    Ok((shadow, camera.project(centre).map(|(at, _)| at.to_array())))
+}

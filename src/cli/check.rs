@@ -1,0 +1,101 @@
+//! `reproduce check`: look before you run.
+
+use super::data::Data;
+use super::output::{Format, emit, emit_json};
+use super::{Context, Exit};
+use crate::check::{self, Finding, SequenceFit};
+use anyhow::Result;
+use serde::Serialize;
+use skinsplat_data::select::evenly_spaced;
+use std::path::PathBuf;
+
+/// See whether bodies, poses, cameras and masks of a data set fit together.
+///
+/// Projects the posed body into every frame and compares it with the frame's mask: intersection over union, and findings
+/// where it says that masks are inverted, poses are shifted, or a body or camera is another one. Exit code 1 if something was
+/// found that would spoil the numbers of a table.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Check {
+    /// Data set, or DATASET/SUBJECT [default: every subject of --data]
+    name: Option<String>,
+    /// At most N frames of each sequence, evenly spaced
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    limit: Option<u32>,
+    /// Also write the body's outline (red) and the mask's (green) over each frame, and a contact sheet per sequence
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// How to print what was found
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    #[command(flatten)]
+    data: Data,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce check neuman/seattle --out look     one subject, with pictures
+  reproduce check --data DIR --format json      every subject of a folder, for programs";
+
+/// What was seen.
+#[derive(Serialize)]
+struct Seen {
+    sequences: Vec<SequenceFit>,
+    findings: Vec<Finding>,
+}
+
+impl Check {
+    pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        let mut seen = Seen { sequences: Vec::new(), findings: Vec::new() };
+        for (name, subject) in self.data.subjects(self.name.as_deref())? {
+            let subject = match subject {
+                Ok(subject) => subject,
+                Err(error) => match Finding::of_error(&error) {
+                    Some(finding) => {
+                        seen.findings.push(Finding { sequence: name, ..finding });
+                        continue;
+                    }
+                    None => return Err(error.into()),
+                },
+            };
+            subject.notes.iter().for_each(|note| context.note(format!("{name}: {note}")));
+            for sequence in subject.sequences() {
+                let all: Vec<usize> = (0..sequence.frames.len()).collect();
+                let frames = evenly_spaced(&all, self.limit.map(|limit| limit as usize));
+                let id = format!("{name}/{}", sequence.id);
+                context.note(format!("{id}: {} frames", frames.len()));
+                let (fit, findings) = check::sequence(sequence, &frames);
+                seen.sequences.push(SequenceFit { id: id.clone(), ..fit });
+                seen.findings.extend(findings.into_iter().map(|f| Finding { sequence: id.clone(), ..f }));
+                if let Some(folder) = &self.out {
+                    check::write_overlays(sequence, &frames, &folder.join(&name))?;
+                }
+            }
+        }
+        match self.format {
+            Format::Json => emit_json(&seen)?,
+            Format::Text => emit(&text(&seen))?,
+        }
+        let spoilt = seen.findings.iter().any(|finding| finding.spoils);
+        Ok(if spoilt { Exit::Failed } else { Exit::Success })
+    }
+}
+
+fn text(Seen { sequences, findings }: &Seen) -> String {
+    let mut text = String::new();
+    for SequenceFit { id, frames, mean_iou } in sequences {
+        let overlaps = frames.iter().filter_map(|f| Some((f.silhouette_iou?, f.name.as_str())));
+        let worst = overlaps.min_by(|a, b| a.0.total_cmp(&b.0));
+        let mean = mean_iou.map_or("none".to_owned(), |mean| format!("{mean:.3}"));
+        let worst = worst.map_or(String::new(), |(overlap, name)| format!(", worst {overlap:.3} ({name})"));
+        text += &format!("{id}: {} frames, mean overlap of body and mask {mean}{worst}\n", frames.len());
+    }
+    for Finding { kind, sequence, detail, spoils } in findings {
+        let weight = if *spoils { "error" } else { "note" };
+        text += &format!("{weight}: {sequence}: {kind}: {detail}\n");
+    }
+    if findings.is_empty() {
+        text += "nothing found\n";
+    }
+    text
+}

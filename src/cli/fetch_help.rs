@@ -1,0 +1,72 @@
+//! `reproduce fetch-help`: how to get a data set that cannot be shipped.
+
+use super::Exit;
+use super::data::Data;
+use super::output::emit;
+use crate::datasets::Dataset;
+use anyhow::Result;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Say who has a data set, what to unpack where, and what a registry says of it.
+#[derive(Debug, clap::Args)]
+pub(super) struct FetchHelp {
+    /// Id of the data set (see `reproduce list datasets`)
+    dataset: String,
+    #[command(flatten)]
+    data: Data,
+}
+
+/// Where the body models are to be had, by what a layout's files are made for.
+const MODELS: [(&str, &str); 2] =
+    [("SMPL", "https://smpl.is.tue.mpg.de"), ("SMPL-X", "https://smpl-x.is.tue.mpg.de")];
+
+impl FetchHelp {
+    pub(super) fn run(&self) -> Result<Exit> {
+        let registry = self.data.registry()?;
+        let dataset = registry.get(&self.dataset)?;
+        emit(&text(dataset)?)?;
+        Ok(Exit::Success)
+    }
+}
+
+fn text(dataset: &Dataset) -> Result<String> {
+    let Dataset { title, provenance, licence, .. } = dataset;
+    let mut text = format!("{title}\n  {provenance}\n  Licence: {licence}\n");
+    if dataset.is_generated() {
+        return Ok(text + "  Nothing to fetch: it is generated.\n");
+    }
+    if let Some(url) = &dataset.url {
+        text += &format!("  To be had from {url}\n");
+    }
+    if let Some(layout) = dataset.reader() {
+        text += &format!("\nLayout {}: {}\n", layout.id, layout.summary);
+    }
+    text += "\nA folder per subject:\n";
+    for folder in dataset.subject_folders().unwrap_or_default() {
+        text += &format!("  {}: {}\n", state(&folder), absolute(&folder).display());
+    }
+    if let Some(model) = &dataset.model {
+        let hands = dataset.layout == "xhumans";
+        let (name, url) = MODELS[usize::from(hands)];
+        let stem = if hands { "SMPLX" } else { "SMPL" };
+        text += &format!(
+            "\nThe body model {name}, under its own licence from {url}, as {stem}_NEUTRAL, {stem}_FEMALE and {stem}_MALE \
+             (.npz or .pkl):\n  {}: {}\n",
+            state(model),
+            absolute(model).display()
+        );
+    }
+    text += "\nThe entry of datasets.toml (paths are relative to that file):\n\n";
+    text += &toml::to_string(&BTreeMap::from([("dataset", [dataset])]))?;
+    text += &format!("\nThen: reproduce check {}\n", dataset.id);
+    Ok(text)
+}
+
+fn state(path: &Path) -> &'static str {
+    if path.exists() { "here" } else { "missing" }
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}

@@ -1,0 +1,130 @@
+//! What `check` finds in data that is right, and in data that was damaged in a known way.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+#[path = "support/mod.rs"]
+mod support;
+
+use glam::DVec3;
+use skinsplat::check::{self, Finding, Kind, SequenceFit};
+use skinsplat_core::scene::{Camera, Mask, Pose, RestBody};
+use skinsplat_data::folder::Options;
+use skinsplat_data::{Error, FrameGenerator, FrameRef, FrameSource, Sequence, Subject, Truth};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A sequence of a Blender subject, its images in memory at a fifth of their size.
+fn original(subject: &str) -> Sequence {
+    let folder = support::data("blender/datasets").join(subject);
+    let subject = Subject::load(Path::new(&folder), &Options::default()).unwrap();
+    subject.train[0].reduced(200).held().unwrap()
+}
+
+fn checked(sequence: &Sequence) -> (SequenceFit, Vec<Finding>) {
+    let frames: Vec<usize> = (0..sequence.frames.len()).collect();
+    check::sequence(sequence, &frames)
+}
+
+fn kinds(sequence: &Sequence) -> Vec<Kind> {
+    checked(sequence).1.iter().map(|finding| finding.kind).collect()
+}
+
+/// The truths of another sequence, changed.
+#[derive(Debug)]
+struct Changed(Vec<Option<Truth>>);
+
+impl FrameGenerator for Changed {
+    fn truth(&self, frame: usize) -> Result<Truth, Error> {
+        let missing = || Error::invalid("frame.png", "image", "missing", "an image");
+        self.0[frame].clone().ok_or_else(missing)
+    }
+
+    fn key(&self) -> Result<String, Error> {
+        Ok("changed".into())
+    }
+}
+
+fn with_truths(sequence: &Sequence, change: impl Fn(usize, Truth) -> Option<Truth>) -> Sequence {
+    let truths = (0..sequence.frames.len()).map(|i| change(i, sequence.truth(i).unwrap())).collect();
+    let generator: Arc<dyn FrameGenerator> = Arc::new(Changed(truths));
+    let source = |frame| FrameSource::Generated { generator: Arc::clone(&generator), frame };
+    let frame = |(i, old): (usize, &FrameRef)| FrameRef { source: source(i), ..old.clone() };
+    let frames = sequence.frames.iter().enumerate().map(frame).collect();
+    Sequence { frames, ..sequence.clone() }
+}
+
+fn with_masks(sequence: &Sequence, change: impl Fn(usize, &Mask) -> Mask) -> Sequence {
+    with_truths(sequence, |i, truth| Some(Truth { alpha: change(i, &truth.alpha), ..truth }))
+}
+
+fn with_cameras(sequence: &Sequence, change: impl Fn(&Camera) -> Camera) -> Sequence {
+    let cameras: Vec<Camera> = sequence.cameras.iter().map(change).collect();
+    Sequence { cameras: cameras.into(), ..sequence.clone() }
+}
+
+fn with_body(sequence: &Sequence, factor: f64) -> Sequence {
+    let body = &sequence.body;
+    let centre = body.vertices.iter().sum::<DVec3>() / body.vertices.len() as f64;
+    let vertices = body.vertices.iter().map(|v| centre + factor * (*v - centre)).collect();
+    let body = RestBody { vertices, ..RestBody::clone(body) };
+    Sequence { body: Arc::new(body), ..sequence.clone() }
+}
+
+/// Frame i takes the pose of frame `of(i)`.
+fn with_poses(sequence: &Sequence, of: impl Fn(usize) -> usize) -> Sequence {
+    let last = sequence.frames.len() - 1;
+    let pose = |i: usize| sequence.frames[of(i).min(last)].pose;
+    let frames =
+        sequence.frames.iter().enumerate().map(|(i, f)| FrameRef { pose: pose(i), ..f.clone() }).collect();
+    Sequence { frames, ..sequence.clone() }
+}
+
+#[test]
+fn nothing_is_found_in_data_that_is_right() {
+    for subject in ["snapshot_ava", "multiview_ben", "xhands_ava"] {
+        let (fit, findings) = checked(&original(subject));
+        assert!(fit.mean_iou.unwrap() > 0.85, "{subject}: {:?}", fit.mean_iou);
+        assert!(findings.is_empty(), "{subject}: {findings:?}");
+        assert!(fit.frames.iter().all(|frame| frame.silhouette_iou.unwrap() > 0.6), "{subject}");
+    }
+}
+
+#[test]
+fn every_damage_is_found_by_its_kind() {
+    let sequence = original("snapshot_ava");
+    let inverted = |mask: &Mask| {
+        Mask::new(mask.width(), mask.height(), mask.values().iter().map(|v| 1.0 - v).collect()).unwrap()
+    };
+    let empty = |mask: &Mask| Mask::filled(mask.width(), mask.height(), 0.0);
+    assert_eq!(kinds(&with_masks(&sequence, |_, mask| inverted(mask))), [Kind::InvertedMasks]);
+    let one_empty = with_masks(&sequence, |i, mask| if i == 2 { empty(mask) } else { mask.clone() });
+    assert_eq!(kinds(&one_empty), [Kind::EmptyMask]);
+    assert_eq!(kinds(&with_truths(&sequence, |i, truth| (i != 1).then_some(truth))), [Kind::MissingFrames]);
+    for shift in [1, 2] {
+        assert_eq!(kinds(&with_poses(&sequence, |i| i + shift)), [Kind::FrameOffset], "{shift} early");
+        assert_eq!(
+            kinds(&with_poses(&sequence, |i| i.saturating_sub(shift))),
+            [Kind::FrameOffset],
+            "{shift} late"
+        );
+    }
+    let n = sequence.frames.len();
+    assert_eq!(
+        kinds(&with_poses(&sequence, |i| (7 * i + 3) % n)),
+        [Kind::FrameOffset],
+        "another order, {n} frames"
+    );
+    for factor in [0.9, 1.1] {
+        let zoomed = |c: &Camera| Camera { fx: c.fx * factor, fy: c.fy * factor, ..c.clone() };
+        assert_eq!(kinds(&with_cameras(&sequence, zoomed)), [Kind::Camera], "focal length {factor}");
+        assert_eq!(kinds(&with_body(&sequence, factor)), [Kind::WrongGenderOrModel], "body {factor}");
+    }
+    for shift in [-12.0, 12.0] {
+        let moved = |c: &Camera| Camera { cx: c.cx + shift, ..c.clone() };
+        assert_eq!(kinds(&with_cameras(&sequence, moved)), [Kind::Camera], "principal point {shift}");
+    }
+    let away = |pose: &Pose| Pose { translation: pose.translation + DVec3::X * 50.0, ..pose.clone() };
+    let poses: Vec<Pose> = sequence.poses.iter().map(away).collect();
+    let gone = Sequence { poses: poses.into(), ..sequence.clone() };
+    assert_eq!(kinds(&gone), [Kind::BodyOutOfView]);
+}

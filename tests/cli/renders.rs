@@ -1,0 +1,148 @@
+//! Frames that another program rendered, as a row of a table.
+
+use crate::args;
+use crate::program::{Answer, Desk, copy};
+use crate::support::data;
+use serde_json::Value;
+use std::ffi::OsString;
+
+/// A desk with the small experiment and a folder of renders of its subject: the true images.
+fn desk() -> Desk {
+    let desk = Desk::new();
+    desk.put("small.toml", include_str!("small.toml"));
+    for k in 0..3 {
+        let name = format!("image_000{k}.png");
+        let bytes = std::fs::read(data(&format!("small/tiny/test_b/images/{name}"))).unwrap();
+        desk.put(&format!("theirs/tiny/{name}"), bytes);
+    }
+    desk
+}
+
+fn run(desk: &Desk, out: &str, more: &[&str]) -> Answer {
+    let mut all =
+        args!["-q", "run", "small.toml", "--data", data("small"), "--fit-iterations", "2", "--out", out];
+    all.extend(more.iter().map(OsString::from));
+    desk.run(all)
+}
+
+fn variant(desk: &Desk, out: &str, id: &str) -> Value {
+    let results: Value = serde_json::from_str(&desk.read(&format!("{out}/results.json"))).unwrap();
+    let variants = results["tables"][0]["sequences"][0]["variants"].as_array().unwrap().clone();
+    variants.into_iter().find(|variant| variant["id"] == id).unwrap()
+}
+
+#[test]
+fn renders_are_scored_under_the_protocol_of_the_table() {
+    let desk = desk();
+    desk.put("theirs/tiny/renders.json", r#"{ "splats": 1234, "bytes": 99, "milliseconds": 4.5 }"#);
+    desk.put("theirs/tiny/._image_0000.png", "no image");
+    run(&desk, "run", &["--renders", "surface=theirs/{subject}"]).exits(0, "the truth as renders");
+    let theirs = variant(&desk, "run", "surface");
+    assert_eq!(theirs["summary"]["identical_frames"], 3, "{theirs}");
+    assert_eq!(theirs["summary"]["values"]["splats"], 1234.0, "{theirs}");
+    let page = desk.read("run/tables.md");
+    assert!(page.contains("rendered by another program") && page.contains("4.5 ms per frame"), "{page}");
+    // The same as a recipe of the experiment's own file.
+    let recipe = "{ recipe = \"renders\", path = \"theirs/{subject}\" }";
+    let text = include_str!("small.toml").replace("\"small\"", "\"own\"");
+    let surface = text.lines().position(|line| line.contains("surface-vertex")).unwrap();
+    let lines = text.lines().enumerate().filter(|(i, line)| {
+        !(*i > surface && *i < surface + 3 && (line.starts_with("strategy") || line.starts_with("sh_degree")))
+    });
+    let lines: Vec<String> = lines
+        .map(|(i, line)| if i == surface { format!("avatar = {recipe}") } else { line.to_owned() })
+        .collect();
+    desk.put("folder/own.toml", lines.join("\n"));
+    desk.run(args![
+        "-q",
+        "run",
+        "folder/own.toml",
+        "--data",
+        data("small"),
+        "--variant",
+        "surface",
+        "--out",
+        "own"
+    ])
+    .exits(2, "no renders below the experiment's folder");
+    std::fs::rename(desk.path("theirs"), desk.path("folder/theirs")).unwrap();
+    desk.run(args![
+        "-q",
+        "run",
+        "folder/own.toml",
+        "--data",
+        data("small"),
+        "--variant",
+        "surface",
+        "--out",
+        "own"
+    ])
+    .exits(0, "renders below the experiment's folder");
+    assert_eq!(variant(&desk, "own", "surface")["summary"]["identical_frames"], 3);
+}
+
+#[test]
+fn gaps_and_wrong_sizes_are_named() {
+    let desk = desk();
+    std::fs::remove_file(desk.path("theirs/tiny/image_0001.png")).unwrap();
+    let answer = run(&desk, "run", &["--renders", "surface=theirs/tiny"]);
+    answer.exits(3, "a frame is missing");
+    assert!(desk.read("run/frames.jsonl").contains("theirs/tiny: frame image_0001: no image"));
+    assert!(desk.read("run/tables.md").contains("image_0001"), "{}", desk.read("run/tables.md"));
+    let small = skinsplat_core::scene::Image::filled(5, 4, [0.5; 3]);
+    skinsplat_data::frames::save_png(&desk.path("theirs/tiny/image_0001.png"), &small).unwrap();
+    run(&desk, "run", &["--renders", "surface=theirs/tiny"]).exits(3, "a frame of another size");
+    assert!(desk.read("run/frames.jsonl").contains("5x4; expected"));
+    let answer = run(&desk, "none", &["--renders", "surface=nowhere/{subject}"]);
+    assert_eq!(answer.code, Some(2));
+    assert!(answer.err.contains("nowhere/tiny: no render of test_b; expected"), "{answer:?}");
+    run(&desk, "none", &["--renders", "other=theirs/tiny"]).exits(2, "no such variant");
+}
+
+/// A subject that cannot be read costs its own row, with the reason, and no other.
+#[test]
+fn half_a_data_set_gives_half_a_table() {
+    let desk = desk();
+    let registry = |subjects: &str| {
+        let head =
+            "[[dataset]]\nid = \"pair\"\ntitle = \"Pair\"\nlayout = \"folder\"\ncapture = \"monocular\"\n";
+        format!(
+            "{head}licence = \"CC0-1.0\"\nprovenance = \"here\"\npath = \"people\"\nsubjects = {subjects}\n"
+        )
+    };
+    copy(&data("small/tiny"), &desk.path("people/tiny"));
+    copy(&data("small/tiny"), &desk.path("people/torn"));
+    desk.put("people/torn/test_b/transforms.json", "{");
+    let text = include_str!("small.toml").replace("\"small\"", "\"pair\"");
+    let text: Vec<String> = text
+        .lines()
+        .filter(|line| !line.starts_with("sequences"))
+        .map(|line| if line.starts_with("dataset =") { "dataset = \"pair\"".into() } else { line.to_owned() })
+        .collect();
+    desk.put("pair.toml", text.join("\n"));
+    let run = |subjects: &str, out: &str| {
+        desk.put("datasets.toml", registry(subjects));
+        desk.run(args![
+            "-q",
+            "run",
+            "pair.toml",
+            "--datasets",
+            "datasets.toml",
+            "--variant",
+            "surface",
+            "--out",
+            out
+        ])
+    };
+    run("[\"tiny\", \"torn\", \"gone\"]", "run").exits(3, "two of three subjects cannot be read");
+    let page = desk.read("run/tables.md");
+    assert!(page.contains("torn/test_b/transforms.json") && page.contains("gone"), "{page}");
+    let answer = run("[\"torn\"]", "none");
+    assert_eq!(answer.code, Some(2));
+    assert!(answer.err.contains("transforms.json"), "{answer:?}");
+    let listed = desk.ok(args!["list", "datasets", "--datasets", "datasets.toml"]);
+    assert!(listed.contains("available"), "{listed}");
+    desk.put("datasets.toml", registry("[\"tiny\", \"gone\"]"));
+    let listed = desk.ok(args!["list", "datasets", "--datasets", "datasets.toml"]);
+    assert!(listed.contains("not complete: no folder") && listed.contains("people/gone"), "{listed}");
+}

@@ -1,0 +1,104 @@
+//! From a folder in somebody else's layout to a row of a table, through the program.
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+
+#[path = "support/program.rs"]
+mod program;
+mod support;
+
+use program::Desk;
+use serde_json::Value;
+use std::path::PathBuf;
+use support::data;
+
+/// A registry with one data set.
+fn registry(layout: &str, capture: &str, path: PathBuf, subject: &str, more: &str) -> String {
+    format!(
+        "[[dataset]]\nid = \"{layout}\"\ntitle = \"T\"\nlayout = \"{layout}\"\ncapture = \"{capture}\"\nlicence = \"CC0-1.0\"\n\
+         provenance = \"here\"\npath = {path:?}\nsubjects = [\"{subject}\"]\n{more}"
+    )
+}
+
+/// A table of two avatars, gathered and fitted, on a data set. The protocol's background is what the data set captured, or
+/// white.
+fn table(dataset: &str, protocol: &str) -> String {
+    let text =
+        include_str!("cli/small.toml").replace("dataset = \"tiny\"", &format!("dataset = \"{dataset}\""));
+    text.replace("protocol = \"default\"", &format!("protocol = \"{protocol}\""))
+}
+
+/// Scores by variant of the only row of a run.
+fn scores(layout: &str, registry: &str, protocol: &str) -> Vec<f64> {
+    let desk = Desk::new();
+    desk.put("sets.toml", registry);
+    desk.put("small.toml", table(layout, protocol));
+    let run =
+        args!["-q", "run", "small.toml", "--datasets", "sets.toml", "--variant", "surface", "--out", "out"];
+    desk.run(run).exits(0, layout);
+    let results: Value = serde_json::from_str(&desk.read("out/results.json")).unwrap();
+    let sequences = results["tables"][0]["sequences"].as_array().unwrap();
+    assert_eq!(sequences.len(), 1, "{layout}");
+    let variants = sequences[0]["variants"].as_array().unwrap();
+    variants.iter().map(|variant| variant["summary"]["values"]["psnr"].as_f64().unwrap_or(f64::NAN)).collect()
+}
+
+fn layouts() -> PathBuf {
+    data("small/layouts")
+}
+
+fn of_ava(layout: &str, folder: &str) -> Vec<f64> {
+    let model = data("blender/models/anny_smpl24.npz");
+    let more = format!(
+        "model = {model:?}\n[dataset.splits]\nava = {{ train = [0, 5, 1], test = [6, 7, 1] }}\n\
+         own = {{ train = [0, 5, 1], test = [6, 7, 1] }}\n"
+    );
+    let (parent, subject) = folder.rsplit_once('/').unwrap();
+    scores(layout, &registry(layout, "monocular", layouts().join(parent), subject, &more), "default")
+}
+
+#[test]
+fn one_person_gets_one_score_through_every_layout() {
+    let own = of_ava("folder", "folder/ava");
+    assert!(own.iter().all(|psnr| *psnr > 5.0 && psnr.is_finite()), "{own:?}");
+    for (layout, folder) in [
+        ("peoplesnapshot", "peoplesnapshot/ava"),
+        ("peoplesnapshot-raw", "peoplesnapshot-raw/ava"),
+        ("neuman", "neuman/ava"),
+        ("neuman", "neuman/own"),
+    ] {
+        let other = of_ava(layout, folder);
+        for (a, b) in own.iter().zip(&other) {
+            assert!((a - b).abs() < 0.02, "{folder}: {other:?} instead of {own:?}");
+        }
+    }
+}
+
+#[test]
+fn takes_of_x_humans_are_rows() {
+    let model = data("blender/models/anny_smplx55.npz");
+    let model = format!("model = {model:?}\n");
+    let own = registry("folder", "hands", layouts().join("folder"), "hands", &model);
+    let other = registry("xhumans", "hands", layouts().join("xhumans"), "00099", &model);
+    let [own, other] =
+        [("folder", own), ("xhumans", other)].map(|(layout, sets)| scores(layout, &sets, "default"));
+    for (a, b) in own.iter().zip(&other) {
+        assert!((a - b).abs() < 0.02, "{other:?} instead of {own:?}");
+    }
+}
+
+#[test]
+fn a_player_is_scored_before_the_captured_background() {
+    let sets = registry("galabasketball", "multiview", layouts().join("galabasketball"), "ball", "");
+    let psnr = scores("galabasketball", &sets, "animatable-gala");
+    assert!(psnr.iter().all(|psnr| *psnr > 5.0), "{psnr:?}");
+}
+
+#[test]
+fn a_damaged_subject_is_one_line() {
+    let desk = Desk::new();
+    program::copy(&layouts().join("neuman/ava"), &desk.path("data/ava"));
+    std::fs::remove_file(desk.path("data/ava/sparse/images.txt")).unwrap();
+    desk.put("sets.toml", registry("neuman", "monocular", "data".into(), "ava", ""));
+    desk.put("small.toml", table("neuman", "default"));
+    let run = args!["-q", "run", "small.toml", "--datasets", "sets.toml", "--out", "out"];
+    desk.run(run).refuses(&["sparse/images.txt", "images", "COLMAP"], "no images.txt");
+}
