@@ -61,7 +61,9 @@ impl List {
 
     fn datasets(&self) -> Result<Table> {
         let here = |d: &crate::datasets::Dataset| match (d.is_available(), &d.path) {
-            (true, _) => "available".to_owned(),
+            (true, _) => {
+                d.first_problem().map_or("available".to_owned(), |why| format!("not available: {why}"))
+            }
             (false, _) if d.reader().is_none() => {
                 format!("not available: nothing reads the layout {} yet", d.layout)
             }

@@ -10,6 +10,9 @@ use std::io::Write;
 /// # Errors
 /// As the pipe or file behind it; a broken pipe is recognised by [`is_broken_pipe`].
 pub(super) fn emit(text: &str) -> Result<()> {
+    // Names and comments are whatever files say: a terminal obeys none of them.
+    let commands = |c: char| c.is_control() && c != '\n' && c != '\t';
+    let text = text.replace(commands, "\u{fffd}");
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).context("standard output: cannot write")
 }

@@ -31,6 +31,16 @@ impl Dataset {
         Ok(self.path.as_deref().map(|path| name(path).unwrap_or_default()).into_iter().collect())
     }
 
+    /// Why a subject cannot be loaded: the first such reason.
+    pub fn first_problem(&self) -> Option<Error> {
+        let ids = match self.subject_ids() {
+            Ok(ids) => ids,
+            Err(problem) => return Some(problem),
+        };
+        let read = ids.iter().filter(|_| !self.is_generated());
+        read.map(|id| self.load_one(id, &Options::default())).find_map(Result::err)
+    }
+
     /// Loads one of [`Dataset::subject_ids`].
     ///
     /// # Errors

@@ -43,10 +43,15 @@ pub(super) fn rows_of(
     datasets: &[Dataset],
     options: &Options,
 ) -> (Source, Vec<DataRow>) {
-    if let Some(own) = datasets.iter().find(|dataset| dataset.id == experiment.dataset) {
-        return (Source::Own, own_rows(experiment, own, options));
-    }
-    let Some(stand_in) = &experiment.stand_in else { return (Source::Absent, Vec::new()) };
+    let own = datasets.iter().find(|dataset| dataset.id == experiment.dataset);
+    let stand_in = match (own, &experiment.stand_in) {
+        // Where nothing of it can be used, a stand-in is of more use than rows of reasons.
+        (Some(own), stand_in) if stand_in.is_none() || !own.subjects.is_empty() => {
+            return (Source::Own, own_rows(experiment, own, options));
+        }
+        (_, Some(stand_in)) => stand_in,
+        (_, None) => return (Source::Absent, Vec::new()),
+    };
     let fits = |s: &&SubjectInfo| stand_in.capture.is_none_or(|capture| s.capture == capture);
     let of_kind = |d: &&Dataset| d.subjects.iter().any(|s| fits(&s));
     let several = datasets.iter().filter(of_kind).count() > 1;
