@@ -169,7 +169,9 @@ fn topological_order(parents: &[Option<usize>]) -> Result<Vec<usize>, SceneError
         stack.extend(children[node].iter().rev());
     }
     if order.len() < parents.len() {
-        let stuck = (0..parents.len()).find(|i| !order.contains(i)).unwrap_or_default();
+        let mut reached = vec![false; parents.len()];
+        order.iter().for_each(|&node| reached[node] = true);
+        let stuck = reached.iter().position(|reached| !reached).unwrap_or_default();
         return Err(SceneError::new(format!("parents[{stuck}]"), "a cycle", "a tree of joints"));
     }
     Ok(order)

@@ -131,15 +131,18 @@ impl Source {
             }
         }
         // A cycle among ancestors would never end the walk to the root.
+        let mut ends = vec![false; parents.len()];
         for start in 0..parents.len() {
-            let mut node = start;
-            for _ in 0..=parents.len() {
-                let Some(parent) = parents[node] else { break };
-                node = parent;
+            let mut path = Vec::new();
+            let mut next = Some(start);
+            while let Some(node) = next.filter(|&node| !ends[node]) {
+                if path.len() == parents.len() {
+                    return Err(SceneError::new(format!("nodes[{start}]"), "a cycle", "a forest of nodes"));
+                }
+                path.push(node);
+                next = parents[node];
             }
-            if parents[node].is_some() {
-                return Err(SceneError::new(format!("nodes[{start}]"), "a cycle", "a forest of nodes"));
-            }
+            path.into_iter().for_each(|node| ends[node] = true);
         }
         Ok(parents)
     }

@@ -13,6 +13,7 @@ use ::gltf::Node;
 use buffers::Source;
 use glam::{DAffine3, DQuat, DVec3, Mat4};
 use skinsplat_core::scene::{Body, LocalTransform, RestBody, SceneError, Skeleton};
+use std::collections::HashMap;
 use std::path::Path;
 
 /// A skinned character: its body and its clips.
@@ -74,12 +75,14 @@ pub(super) struct Joints<'a> {
     source: &'a Source,
     /// glTF node per skeleton node: joints first, then ancestors.
     nodes: Vec<usize>,
+    /// Skeleton node of each glTF node that is one.
+    places: HashMap<usize, usize>,
     inverse_binds: Vec<DAffine3>,
 }
 
 impl<'a> Joints<'a> {
     fn collect(source: &'a Source) -> Result<Self, SceneError> {
-        let mut nodes = Vec::new();
+        let (mut nodes, mut places) = (Vec::new(), HashMap::new());
         let mut inverse_binds = Vec::new();
         for node in source.document.nodes().filter(|node| node.mesh().is_some()) {
             let Some(skin) = node.skin() else { continue };
@@ -98,12 +101,13 @@ impl<'a> Joints<'a> {
             }
             for (joint, bind) in skin.joints().zip(binds) {
                 let bind = DAffine3::from_mat4(bind.as_dmat4());
-                match nodes.iter().position(|&n| n == joint.index()) {
+                match places.get(&joint.index()) {
                     None => {
+                        places.insert(joint.index(), nodes.len());
                         nodes.push(joint.index());
                         inverse_binds.push(bind);
                     }
-                    Some(known) if inverse_binds[known] == bind => {}
+                    Some(&known) if inverse_binds[known] == bind => {}
                     Some(_) => {
                         let problem = format!("node {} has two inverse bind matrices", joint.index());
                         return Err(SceneError::new(field, problem, "skins that agree on shared joints"));
@@ -117,17 +121,18 @@ impl<'a> Joints<'a> {
         let parents = source.parents()?;
         for joint in 0..nodes.len() {
             let mut ancestor = parents[nodes[joint]];
-            while let Some(node) = ancestor.filter(|node| !nodes.contains(node)) {
+            while let Some(node) = ancestor.filter(|node| !places.contains_key(node)) {
+                places.insert(node, nodes.len());
                 nodes.push(node);
                 ancestor = parents[node];
             }
         }
-        Ok(Self { source, nodes, inverse_binds })
+        Ok(Self { source, nodes, places, inverse_binds })
     }
 
     /// The skeleton node of a glTF node.
     pub(super) fn index_of(&self, node: &Node) -> Option<usize> {
-        self.nodes.iter().position(|&n| n == node.index())
+        self.places.get(&node.index()).copied()
     }
 
     /// Number of joints.
@@ -139,7 +144,7 @@ impl<'a> Joints<'a> {
         let all: Vec<Node> = self.source.document.nodes().collect();
         let parents = self.source.parents()?;
         let name = |&i: &usize| all[i].name().map_or_else(|| format!("joint {i}"), str::to_owned);
-        let parent = |&i: &usize| parents[i].and_then(|p| self.nodes.iter().position(|&n| n == p));
+        let parent = |&i: &usize| parents[i].and_then(|p| self.places.get(&p).copied());
         let local = |&i: &usize| {
             let (translation, [x, y, z, w], scale) = all[i].transform().decomposed();
             LocalTransform {
