@@ -1,5 +1,7 @@
-//! `reproduce`: the command-line program. All of it lives in [`skinsplat::cli`].
+//! `reproduce`: the command-line program. A crate of its own, so that an edit of it leaves the harness as built.
+
+mod cli;
 
 fn main() -> std::process::ExitCode {
-    skinsplat::cli::main()
+    cli::main()
 }

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 /// Modules of the harness, lowest first: one imports only from those before it.
-const MODULES: [&str; 6] = ["check", "datasets", "experiment", "run", "report", "cli"];
+const MODULES: [&str; 5] = ["check", "datasets", "experiment", "run", "report"];
 
 /// The crates, and what each may be built on. Tests and examples may use more.
 const CRATES: [(&str, &[&str]); 12] = [
@@ -103,7 +103,7 @@ fn no_module_imports_upwards() {
             continue;
         };
         let Some(own) = layer(module) else {
-            assert!(["lib", "main"].contains(&module), "{file}: not in the list of modules");
+            assert!(["lib", "main", "cli"].contains(&module), "{file}: not in the list of modules");
             continue;
         };
         for import in imported(&code(&text)) {

@@ -3,9 +3,9 @@
 use super::data::Data;
 use super::output::{Format, emit, emit_json};
 use super::{Context, Exit};
-use crate::check::{self, Finding, SequenceFit};
 use anyhow::Result;
 use serde::Serialize;
+use skinsplat::check::{self, Finding, SequenceFit};
 use skinsplat_data::select::evenly_spaced;
 use std::path::PathBuf;
 

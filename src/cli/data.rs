@@ -1,9 +1,9 @@
 //! Which data a command looks at.
 
-use crate::datasets::{Dataset, Registry};
-use crate::experiment::{AvatarRecipe, Experiment, Unreadable};
-use crate::run::{Library, LoadedDataset, RegisteredAvatar};
 use anyhow::{Result, bail};
+use skinsplat::datasets::{Dataset, Registry};
+use skinsplat::experiment::{AvatarRecipe, Experiment, Unreadable};
+use skinsplat::run::{Library, LoadedDataset, RegisteredAvatar};
 use skinsplat_data::folder::Options;
 use skinsplat_data::{Error, Subject};
 use std::path::{Path, PathBuf};

@@ -3,8 +3,8 @@
 use super::Exit;
 use super::data::Data;
 use super::output::emit;
-use crate::datasets::Dataset;
 use anyhow::Result;
+use skinsplat::datasets::Dataset;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -4,9 +4,9 @@ mod needs;
 
 use super::Exit;
 use super::output::emit;
-use crate::report::Results;
-use crate::run::store;
 use anyhow::{Context as _, Result, anyhow, bail};
+use skinsplat::report::Results;
+use skinsplat::run::store;
 use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, Binding, Body, Image, Mask};
 use skinsplat_data::arrays::Arrays;
@@ -231,13 +231,14 @@ fn json_text(path: &Path) -> Result<String> {
 
 fn store_text(path: &Path) -> Result<String> {
     let records = store::read(path)?;
-    let failed =
-        |r: &&crate::experiment::FrameRecord| matches!(r.outcome, crate::experiment::Outcome::Error(_));
+    let failed = |r: &&skinsplat::experiment::FrameRecord| {
+        matches!(r.outcome, skinsplat::experiment::Outcome::Error(_))
+    };
     let failures: Vec<_> = records.values().filter(failed).collect();
     let mut text = line("kind", "results store") + &line("records", records.len());
     text += &line("failed", failures.len());
     for record in failures {
-        if let crate::experiment::Outcome::Error(problem) = &record.outcome {
+        if let skinsplat::experiment::Outcome::Error(problem) = &record.outcome {
             text += &line(&record.label, problem);
         }
     }
@@ -260,7 +261,7 @@ fn folder_text(path: &Path) -> Result<String> {
     if folder::is_subject(path) {
         return Ok(line("kind", "subject") + &subject_text(&Subject::load(path, &Options::default())?));
     }
-    let registry = crate::datasets::Registry::scan(path)?;
+    let registry = skinsplat::datasets::Registry::scan(path)?;
     let mut text = line("kind", "folder of subjects");
     for dataset in &registry.datasets {
         for subject in dataset.load(&Options::default())? {

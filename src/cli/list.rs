@@ -60,7 +60,7 @@ impl List {
     }
 
     fn datasets(&self) -> Result<Table> {
-        let here = |d: &crate::datasets::Dataset| match (d.is_available(), &d.path) {
+        let here = |d: &skinsplat::datasets::Dataset| match (d.is_available(), &d.path) {
             (true, _) => {
                 d.first_problem().map_or("available".to_owned(), |why| format!("not available: {why}"))
             }

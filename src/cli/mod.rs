@@ -38,7 +38,7 @@ use std::process::ExitCode;
 #[derive(Debug, Parser)]
 #[command(name = "reproduce", version, after_help = exit::HELP, propagate_version = true, arg_required_else_help = true)]
 #[command(max_term_width = 110)]
-pub struct Cli {
+pub(crate) struct Cli {
     /// Threads to compute with; results do not depend on it [default: SLURM_CPUS_PER_TASK, else all cores]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -85,7 +85,7 @@ impl Context {
 }
 
 /// Parses the command line and runs the subcommand.
-pub fn main() -> ExitCode {
+pub(crate) fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return answered(&error),

@@ -3,9 +3,9 @@
 use super::Exit;
 use super::output::{Format, emit, emit_json};
 use super::planning::{Planned, Planning};
-use crate::experiment::{self, Shard};
-use crate::run::store;
 use anyhow::Result;
+use skinsplat::experiment::{self, Shard};
+use skinsplat::run::store;
 use std::path::PathBuf;
 
 /// Show what a run would do, without doing it.

@@ -2,11 +2,11 @@
 
 use super::data::Data;
 use super::lpips::LpipsWeights;
-use crate::experiment::{
+use anyhow::{Result, bail};
+use skinsplat::experiment::{
     self, AvatarRecipe, Experiment, GIVEN_AVATAR, GivenWeights, Options, Plan, Profile, Subset, Variant,
 };
-use crate::run::{Library, RegisteredAvatar};
-use anyhow::{Result, bail};
+use skinsplat::run::{Library, RegisteredAvatar};
 use skinsplat_metrics::lpips::weights::Networks;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

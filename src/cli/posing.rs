@@ -1,8 +1,8 @@
 //! An avatar, a body, a frame of a pose track and a strategy: the arguments of `render` and `skin`.
 
-use crate::run::drawable::{Drawable, Look, PosedView, Scratch};
-use crate::run::foreign::{OnBody, on_body};
 use anyhow::{Context as _, Result, bail};
+use skinsplat::run::drawable::{Drawable, Look, PosedView, Scratch};
+use skinsplat::run::foreign::{OnBody, on_body};
 use skinsplat_core::scene::{
     Avatar, Binding, Body, Camera, Image, OwnedPosed, Pose, Posed, PosedBody, RestBody,
 };

@@ -1,7 +1,7 @@
 //! Progress: a bar on a terminal, a line per avatar and per sequence elsewhere.
 
-use crate::run::Event;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use skinsplat::run::Event;
 use skinsplat_fit::train::Step;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};

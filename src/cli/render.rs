@@ -2,8 +2,8 @@
 
 use super::posing::Posing;
 use super::{Context, Exit, selection::parse_colour};
-use crate::run::drawable::{Behind, Look};
 use anyhow::{Result, bail};
+use skinsplat::run::drawable::{Behind, Look};
 use skinsplat_data::{camera, frames};
 use std::path::PathBuf;
 

@@ -3,9 +3,9 @@
 use super::output::{emit, emit_json, table_format, written};
 use super::tolerances::ToleranceOptions;
 use super::{Context, Exit};
-use crate::report::compare::{Changes, Move, compare};
-use crate::report::{self, Results};
 use anyhow::{Context as _, Result, anyhow};
+use skinsplat::report::compare::{Changes, Move, compare};
+use skinsplat::report::{self, Results};
 use std::path::{Path, PathBuf};
 
 /// Print the tables of a run again, or compare them with a baseline.

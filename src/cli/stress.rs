@@ -53,7 +53,7 @@ impl Stress {
             let examined = section.examine(self.quick)?;
             findings.push(examined.findings);
             pictures.extend(examined.pictures);
-            watch.see(crate::run::Event::FrameDone);
+            watch.see(skinsplat::run::Event::FrameDone);
         }
         drop(watch);
         let report = Report::new(self.quick, findings, pictures);

@@ -1,7 +1,7 @@
 //! `--tolerance-METRIC` for every metric of [`MetricId::all`].
 
-use crate::report::compare::Tolerances;
 use clap::{Arg, ArgMatches, Args, Command, Error, FromArgMatches, value_parser};
+use skinsplat::report::compare::Tolerances;
 use skinsplat_metrics::MetricId;
 
 /// How far numbers may move, by options that are named after the metrics.

@@ -99,10 +99,8 @@ impl Behind<'_> {
 
     /// Adds what shows of a picture.
     fn add(self, image: &mut Image, alpha: &Mask) {
-        let Self::Picture(picture) = self else { return };
-        let behind = picture.pixels().iter().zip(alpha.values());
-        for (pixel, (behind, alpha)) in image.pixels_mut().iter_mut().zip(behind) {
-            *pixel = std::array::from_fn(|c| pixel[c] + (1.0 - alpha) * behind[c]);
+        if let Self::Picture(picture) = self {
+            image.add_behind(alpha, picture);
         }
     }
 }

@@ -31,21 +31,12 @@ impl Blend {
         if indices.is_empty() {
             return Self::IDENTITY;
         }
-        let mut blend =
-            Self { linear: [[0.0; LANES]; 9], translation: [[0.0; LANES]; 3], weight: [0.0; LANES] };
-        for (&joint, weight) in indices.iter().zip(weights) {
-            let joint = usize::from(joint);
-            add(&mut blend.linear, &joints.linear[joint], weight);
-            for (sum, &t) in blend.translation.iter_mut().zip(&joints.translation[joint]) {
-                for lane in 0..LANES {
-                    sum[lane] += weight[lane] * t;
-                }
-            }
-            for lane in 0..LANES {
-                blend.weight[lane] += weight[lane];
-            }
+        let mut translation = [[0.0; LANES]; 3];
+        for (axis, total) in translation.iter_mut().enumerate() {
+            *total = sum(indices, weights, |joint| joints.translation[joint][axis]);
         }
-        blend
+        let linear = rotations(&joints.linear, indices, weights);
+        Self { linear, translation, weight: sum(indices, weights, |_| 1.0) }
     }
 
     /// B x + t.
@@ -82,14 +73,14 @@ impl Blend {
     }
 }
 
-/// Σ w_j R_j where the joints also scale, so that it is not [`Blend::linear`].
+/// Σ w_j M_j.
 #[inline(always)]
 pub(super) fn rotations(matrices: &[Matrix3<f32>], indices: &[u16], weights: &[Lanes]) -> [Lanes; 9] {
-    let mut sum = [[0.0; LANES]; 9];
-    for (&joint, weight) in indices.iter().zip(weights) {
-        add(&mut sum, &matrices[usize::from(joint)], weight);
+    let mut blend = [[0.0; LANES]; 9];
+    for (entry, total) in blend.iter_mut().enumerate() {
+        *total = sum(indices, weights, |joint| matrices[joint].as_flattened()[entry]);
     }
-    sum
+    blend
 }
 
 /// Σ w_j s_j, the growth of each lane; 1 for Gaussians without joints.
@@ -98,21 +89,19 @@ pub(super) fn growth(scales: &[f32], indices: &[u16], weights: &[Lanes]) -> Lane
     if indices.is_empty() {
         return [1.0; LANES];
     }
+    sum(indices, weights, |joint| scales[joint])
+}
+
+/// Σ w_j v_j of one number per joint. A loop over joints for each number, eight lanes at once: all numbers in one loop are more
+/// than compilers keep as vectors.
+#[inline(always)]
+fn sum(indices: &[u16], weights: &[Lanes], of_joint: impl Fn(usize) -> f32) -> Lanes {
     let mut sum = [0.0; LANES];
     for (&joint, weight) in indices.iter().zip(weights) {
-        let scale = scales[usize::from(joint)];
+        let value = of_joint(usize::from(joint));
         for lane in 0..LANES {
-            sum[lane] += weight[lane] * scale;
+            sum[lane] += weight[lane] * value;
         }
     }
     sum
-}
-
-#[inline(always)]
-fn add(sum: &mut [Lanes; 9], matrix: &Matrix3<f32>, weight: &Lanes) {
-    for (sum, &entry) in sum.iter_mut().zip(matrix.as_flattened()) {
-        for lane in 0..LANES {
-            sum[lane] += weight[lane] * entry;
-        }
-    }
 }

@@ -3,8 +3,8 @@
 use super::super::Context as Terminal;
 use super::super::output::{Format, emit, emit_json};
 use super::line;
-use crate::run::foreign::on_body;
 use anyhow::{Context as _, Result, bail};
+use skinsplat::run::foreign::on_body;
 use skinsplat_core::scene::{Body, Pose, RestBody};
 use skinsplat_data::avatar::read_avatar;
 use skinsplat_data::{body, poses};

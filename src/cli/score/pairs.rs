@@ -2,9 +2,9 @@
 
 use crate::cli::Context;
 use crate::cli::progress::Watch;
-use crate::run::Event;
 use anyhow::{Result, bail};
 use rayon::prelude::*;
+use skinsplat::run::Event;
 use skinsplat_core::scene::{Image, Mask};
 use skinsplat_data::frames::{load_image, load_mask};
 use skinsplat_data::listing;

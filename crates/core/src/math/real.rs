@@ -58,6 +58,8 @@ pub trait Real:
     fn abs(self) -> Self;
     /// The magnitude of `self` with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
+    /// e to the power of `self`, of the same bits everywhere.
+    fn exp(self) -> Self;
     /// Four-quadrant angle of the point (x = `x`, y = `self`), radians.
     fn atan2(self, x: Self) -> Self;
     /// Neither infinite nor NaN.
@@ -69,7 +71,7 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($type:ident, $triple:ty) => {
+    ($type:ident, $triple:ty, $exp:path) => {
         impl Real for $type {
             type Triple = $triple;
             const ZERO: Self = 0.0;
@@ -98,6 +100,10 @@ macro_rules! real {
                 $type::copysign(self, sign)
             }
             #[inline(always)]
+            fn exp(self) -> Self {
+                $exp(self)
+            }
+            #[inline(always)]
             fn atan2(self, x: Self) -> Self {
                 super::portable::atan2(self, x)
             }
@@ -117,5 +123,5 @@ macro_rules! real {
     };
 }
 
-real!(f32, glam::Vec3A);
-real!(f64, glam::DVec3);
+real!(f32, glam::Vec3A, super::portable::exp_of_f32);
+real!(f64, glam::DVec3, libm::exp);

@@ -63,6 +63,16 @@ impl Image {
         self.pixels[y * self.width + x]
     }
 
+    /// Adds a picture of the same size where `alpha` lets it through: `self + (1 - alpha) picture`.
+    pub fn add_behind(&mut self, alpha: &Mask, picture: &Self) {
+        let behind = picture.pixels.iter().zip(alpha.values());
+        for (pixel, (behind, alpha)) in self.pixels.iter_mut().zip(behind) {
+            for (channel, behind) in pixel.iter_mut().zip(behind) {
+                *channel += (1.0 - alpha) * behind;
+            }
+        }
+    }
+
     /// `rgb * a + background * (1 - a)` with straight (un-premultiplied) colours, in sRGB values as 3DGS code does.
     ///
     /// # Errors

@@ -150,12 +150,11 @@ fn along_basis<L: Lanes>([x, y, z]: [Wide<L>; 3], e: &[Wide<L>; 16]) -> [Wide<L>
     let n = |value: f32| x.constant(value);
     let two = n(2.0);
     let (xx, yy, zz, xy, yz, xz) = (x * x, y * y, z * z, x * y, y * z, x * z);
-    let [_, e1, e2, e3, ..] = each(*e, |e| e * n(C1));
-    let e_at = |k: usize, constant: f32| e[k] * n(constant);
-    let [e4, e5, e6, e7, e8] =
-        [e_at(4, C2[0]), e_at(5, C2[1]), e_at(6, 2.0 * C2[2]), e_at(7, C2[3]), e_at(8, 2.0 * C2[4])];
-    let [e9, e10, e11, e12] = [e_at(9, C3[0]), e_at(10, C3[1]), e_at(11, C3[2]), e_at(12, C3[3])];
-    let [e13, e14, e15] = [e_at(13, C3[4]), e_at(14, C3[5]), e_at(15, C3[6])];
+    let [e1, e2, e3] = [e[1] * n(C1), e[2] * n(C1), e[3] * n(C1)];
+    let (e4, e5, e6) = (e[4] * n(C2[0]), e[5] * n(C2[1]), e[6] * n(2.0 * C2[2]));
+    let (e7, e8) = (e[7] * n(C2[3]), e[8] * n(2.0 * C2[4]));
+    let (e9, e10, e11, e12) = (e[9] * n(C3[0]), e[10] * n(C3[1]), e[11] * n(C3[2]), e[12] * n(C3[3]));
+    let (e13, e14, e15) = (e[13] * n(C3[4]), e[14] * n(C3[5]), e[15] * n(C3[6]));
     // 3 (x² - y²), 4z² - x² - y², and the latter's derivatives along x, y (both over -2) and z (over 8).
     let difference = n(3.0) * (xx - yy);
     let four_zz = n(4.0).mul_add(zz, -(xx + yy));

@@ -226,9 +226,11 @@ pub(super) fn screen_axis<L: Lanes>(
     let slope = affine(projection.rows[k], mean) * inverse_z;
     let limited = slope.max(-limit).min(limit);
     let scale = number(projection.focal[k]) * inverse_z;
-    let row = each([0, 1, 2], |i| {
-        limited.neg_mul_add(number(projection.rows[2][i]), number(projection.rows[k][i])) * scale
-    });
+    let (forward, along) = (projection.rows[2], projection.rows[k]);
+    let mut row = [limited; 3];
+    for i in 0..3 {
+        row[i] = limited.neg_mul_add(number(forward[i]), number(along[i])) * scale;
+    }
     ScreenAxis { slope, limited, row, factor: each(factor, |column| dot(row, column)) }
 }
 

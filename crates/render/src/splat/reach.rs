@@ -6,7 +6,7 @@
 use super::grid::{BLOCK, BLOCKS_PER_TILE, COLUMNS, STRIP_TILES, Strip, TILE};
 use super::lanes::Lanes;
 use super::preprocess::Splat;
-use super::project::SAFETY;
+use super::project::{Ellipse, SAFETY};
 use super::wide::Wide;
 
 /// Splats that are taken at a time: bounds the lists' memory, and lets a strip that is done stop early.
@@ -174,20 +174,34 @@ fn spans<L: Lanes>(l: L, b: &Bounds, top: f32) -> [i32; 16] {
     let low = n(top - SAFETY) - load(&b.y);
     let high = low + n((BLOCK - 1) as f32 + 2.0 * SAFETY);
     let within = |dy: Wide<L>| dy.min(high).max(low);
-    let (bend, width2) = (load(&b.bend), load(&b.half_width_squared));
-    // Half the row's width, squared: negative where the ellipse does not reach the row.
-    let square = |dy: Wide<L>| bend.neg_mul_add(dy * dy, width2);
-    let half = |dy: Wide<L>| square(dy).max(n(0.0)).sqrt();
-    let (right_dy, left_dy) = (within(load(&b.rightmost)), within(-load(&b.rightmost)));
-    let (slope, x) = (load(&b.slope), load(&b.x));
-    let right = slope.mul_add(right_dy, x) + half(right_dy);
-    let left = slope.mul_add(left_dy, x) - half(left_dy);
+    let ellipse = Ellipse {
+        slope: load(&b.slope),
+        bend: load(&b.bend),
+        half_width_squared: load(&b.half_width_squared),
+        rightmost: load(&b.rightmost),
+    };
+    let (right_dy, left_dy) = (within(ellipse.rightmost), within(-ellipse.rightmost));
+    let x = load(&b.x);
+    let right = ellipse.slope.mul_add(right_dy, x) + half_width(&ellipse, right_dy);
+    let left = ellipse.slope.mul_add(left_dy, x) - half_width(&ellipse, left_dy);
     let per_block = n(1.0 / BLOCK as f32);
     let first = ((left - n((BLOCK - 1) as f32 + SAFETY)) * per_block).ceil();
     let end = ((right + n(SAFETY)) * per_block).floor() + n(1.0);
     let first = first.max(load(&b.first_block));
     let end = end.min(load(&b.end_block));
     let packed = end.mul_add(n(256.0), first);
-    let misses = square(within(n(0.0))).less(n(0.0));
+    let misses = half_width_squared(&ellipse, within(n(0.0))).less(n(0.0));
     misses.select(n(0.0), first.less(end).keep(packed)).to_integers()
+}
+
+/// Half the width of row `dy`, squared: negative where the ellipse does not reach the row. (A closure that is used more than
+/// once is not always inlined, and then has no vector instructions.)
+#[inline(always)]
+fn half_width_squared<L: Lanes>(ellipse: &Ellipse<Wide<L>>, dy: Wide<L>) -> Wide<L> {
+    ellipse.bend.neg_mul_add(dy * dy, ellipse.half_width_squared)
+}
+
+#[inline(always)]
+fn half_width<L: Lanes>(ellipse: &Ellipse<Wide<L>>, dy: Wide<L>) -> Wide<L> {
+    half_width_squared(ellipse, dy).max(dy.constant(0.0)).sqrt()
 }

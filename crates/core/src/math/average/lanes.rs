@@ -27,7 +27,9 @@ const RANK_ONE: f32 = 2.0e-4;
 pub fn from_blends<const N: usize>(blend: &[[f32; N]; 9], weight: &[f32; N]) -> Lanes<N> {
     let mut a = [[0.0; N]; 10];
     for i in 0..N {
-        let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = lane(blend, i);
+        let [xx, xy, xz] = [blend[0][i], blend[1][i], blend[2][i]];
+        let [yx, yy, yz] = [blend[3][i], blend[4][i], blend[5][i]];
+        let [zx, zy, zz] = [blend[6][i], blend[7][i], blend[8][i]];
         a[0][i] = (weight[i] + xx) + (yy + zz);
         a[4][i] = (weight[i] + xx) - (yy + zz);
         a[7][i] = (weight[i] - xx) + (yy - zz);
@@ -56,7 +58,7 @@ fn dominant<const N: usize>(mut a: [[f32; N]; 10]) -> Lanes<N> {
         let m = lane(&a, i);
         set_lane(&mut a, i, squaring::scaled(&m, 1.0 / squaring::trace(&m)));
     }
-    // As wide as the numbers beside it, so that it lives in the same kind of vector register.
+    // Every bit set or none: lanes are chosen by their bits, since a branch in the loop would keep it from being vector code.
     let mut settled = [0_u32; N];
     for _ in 0..squaring::MAX_SQUARINGS {
         let mut open = 0;
@@ -65,10 +67,9 @@ fn dominant<const N: usize>(mut a: [[f32; N]; 10]) -> Lanes<N> {
             let next = squaring::square(&m);
             let trace = squaring::trace(&next);
             let next = squaring::scaled(&next, 1.0 / trace);
-            let keep = settled[i] != 0;
-            set_lane(&mut a, i, from_fn(|k| if keep { m[k] } else { next[k] }));
-            settled[i] |= u32::from(squaring::is_square_rank_one(trace, RANK_ONE));
-            open += 1 - settled[i];
+            set_lane(&mut a, i, from_fn(|k| choose(settled[i], m[k], next[k])));
+            settled[i] |= u32::from(squaring::is_square_rank_one(trace, RANK_ONE)).wrapping_neg();
+            open |= !settled[i];
         }
         if open == 0 {
             break;
@@ -78,13 +79,18 @@ fn dominant<const N: usize>(mut a: [[f32; N]; 10]) -> Lanes<N> {
     for i in 0..N {
         let [w, x, y, z] = squaring::largest_column(&lane(&a, i));
         let inverse = 1.0 / ((w * w + x * x) + (y * y + z * z)).sqrt();
-        let keep = settled[i] != 0;
-        quats[0][i] = if keep { w * inverse } else { 1.0 };
-        quats[1][i] = if keep { x * inverse } else { 0.0 };
-        quats[2][i] = if keep { y * inverse } else { 0.0 };
-        quats[3][i] = if keep { z * inverse } else { 0.0 };
+        quats[0][i] = choose(settled[i], w * inverse, 1.0);
+        quats[1][i] = choose(settled[i], x * inverse, 0.0);
+        quats[2][i] = choose(settled[i], y * inverse, 0.0);
+        quats[3][i] = choose(settled[i], z * inverse, 0.0);
     }
     Lanes { quats, settled: settled.map(|mask| mask != 0) }
+}
+
+/// `a` where the bits of the mask are set, `b` where none is.
+#[inline(always)]
+fn choose(mask: u32, a: f32, b: f32) -> f32 {
+    f32::from_bits((a.to_bits() & mask) | (b.to_bits() & !mask))
 }
 
 /// Lane `i` of a structure of arrays.
