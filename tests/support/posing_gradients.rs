@@ -154,7 +154,11 @@ impl<'a> Case<'a> {
         upstream: &PosedGradient,
         parameter: Parameter,
     ) -> [Vec<f64>; 2] {
+        // Steps of half a metre are for what is linear: two centimetres where R or the normal depends on the mean.
+        let along_mean = matches!(parameter, Parameter::Mean(_) | Parameter::Offset);
+        let unit = if along_mean && rig::pushes(strategy) { 0.04 } else { 1.0 };
         let slope = |factor: f32| {
+            let factor = factor * unit;
             let (up, forth) = self.moved(strategy, upstream, parameter, factor);
             let (down, back) = self.moved(strategy, upstream, parameter, -factor);
             let of = |i: usize| (up[i] - down[i]) / (forth[i] - back[i]);
@@ -195,13 +199,16 @@ impl<'a> Case<'a> {
     }
 }
 
-/// True if what becomes of R_c jumps somewhere: at the branches of a conversion, at another thin axis.
+/// True if what becomes of a Gaussian jumps somewhere: at the branches of a conversion, at another thin axis, where two
+/// rotations are as near to the derivative of LBS, where the posed surface folds.
 pub(crate) fn chooses(strategy: &Strategy) -> bool {
     let converts = matches!(
         strategy.rotation,
         RotationChoice::Lbs(LbsProjection::MatrixToQuaternion | LbsProjection::MatrixToQuaternionRaw)
     );
-    converts || strategy.covariance == CovarianceChoice::Surfel
+    let nearest = matches!(strategy.rotation, RotationChoice::PushForward(_));
+    let folds = strategy.covariance == CovarianceChoice::PushForwardNormal;
+    converts || nearest || folds || strategy.covariance == CovarianceChoice::Surfel
 }
 
 pub(crate) fn kinds(face_bound: bool) -> Vec<Vec<Parameter>> {

@@ -60,6 +60,26 @@ pub(crate) fn body() -> RestBody {
     RestBody { skeleton, vertices, faces, weights, uv: None, pose_directions: Vec::new() }
 }
 
+/// The same tube with weights that change smoothly along it, three joints at most: for what reads how they change.
+pub(crate) fn smooth_body() -> RestBody {
+    let mut body = body();
+    let row = |x: f64| {
+        let near = |j: usize| (1.0 - (x - 0.2 * j as f64).abs() / 0.35).max(0.0).powi(2);
+        let sum: f64 = (0..JOINTS).map(near).sum();
+        (0..JOINTS).map(|j| (j, (near(j) / sum) as f32)).filter(|(_, w)| *w > 0.0).collect::<Vec<_>>()
+    };
+    let rows: Vec<_> = body.vertices.iter().map(|v| row(v.x)).collect();
+    body.weights = SkinWeights::from_rows(rows, JOINTS).unwrap();
+    body
+}
+
+/// True if a strategy reads how weights change along the surface.
+pub(crate) fn pushes(strategy: &Strategy) -> bool {
+    let by_covariance =
+        matches!(strategy.covariance, CovarianceChoice::PushForward | CovarianceChoice::PushForwardNormal);
+    by_covariance || matches!(strategy.rotation, RotationChoice::PushForward(_))
+}
+
 /// Every joint turned by up to `bend` radians about each axis.
 pub(crate) fn bent(body: &RestBody, seed: u64, bend: f64) -> Pose {
     let mut noise = Noise(seed);
@@ -138,23 +158,22 @@ pub(crate) fn on_faces(body: &RestBody, n: usize, seed: u64) -> Avatar {
 /// Every rotation choice with the presets' other choices, and every other choice with the presets' rotations.
 pub(crate) fn strategies() -> Vec<Strategy> {
     // Seeds of tests follow the order: new choices come last.
-    let is_new = |rotation: &RotationChoice| *rotation == RotationChoice::LiftedSum;
-    let mut rotations: Vec<RotationChoice> =
-        RotationChoice::named().filter(|rotation| !is_new(rotation)).collect();
-    for id in ["closed-form", "eigen", "polar", "power-15", "nlerp", "squaring-6", "vertex-average-eigen"] {
-        rotations.push(id.parse().unwrap());
-    }
+    let is_new = |strategy: &Strategy| {
+        pushes(strategy)
+            || strategy.rotation == RotationChoice::LiftedSum
+            || strategy.covariance == CovarianceChoice::RotateByAverage
+    };
     let mut all: Vec<Strategy> = PRESETS.iter().map(|preset| preset.strategy).collect();
-    for rotation in rotations {
-        all.extend(variants(rotation));
+    all.extend(RotationChoice::named().flat_map(variants));
+    for id in ["closed-form", "eigen", "polar", "power-15", "nlerp", "squaring-6", "vertex-average-eigen"] {
+        all.extend(variants(id.parse().unwrap()));
     }
     for preset in PRESETS {
         all.extend(ColourChoice::ALL.map(|colour| Strategy { colour, ..preset.strategy }));
         all.extend(CovarianceChoice::ALL.map(|covariance| Strategy { covariance, ..preset.strategy }));
     }
-    for rotation in RotationChoice::named().filter(is_new) {
-        all.extend(variants(rotation));
-    }
+    let (new, mut all): (Vec<_>, Vec<_>) = all.into_iter().partition(is_new);
+    all.extend(new);
     all
 }
 
@@ -183,6 +202,9 @@ pub(crate) fn equivariant(rotation: RotationChoice) -> bool {
         RotationChoice::QuaternionAverage(solver) | RotationChoice::VertexAverage(solver) => {
             !matches!(solver, Solver::Squaring { .. })
         }
-        RotationChoice::FaceFrame(_) | RotationChoice::LiftedSum | RotationChoice::DualQuaternion => true,
+        RotationChoice::FaceFrame(_)
+        | RotationChoice::LiftedSum
+        | RotationChoice::PushForward(_)
+        | RotationChoice::DualQuaternion => true,
     }
 }

@@ -8,12 +8,13 @@ use super::error::expect_count;
 use super::frame::{Frame, Visitor};
 use super::lanes::{self, LANES, Lanes, put, take};
 use super::layout::{Block, CHUNK};
-use super::rotate::{BlockInput, Rotated, means_adjoint, rotation_adjoint};
+use super::push_forward::Derivative;
+use super::rotate::{BlockInput, Rotated, drawn_adjoint, means_adjoint, polar_adjoint, rotation_adjoint};
 use super::surfel::Disc;
-use super::{BoundAvatar, ColourChoice, CovarianceChoice, PosingError, colour, covariance};
+use super::{Across, BoundAvatar, ColourChoice, CovarianceChoice, PosingError, colour, covariance};
 use glam::Vec3;
 use rayon::prelude::*;
-use skinsplat_core::math::{Quaternion, dot4, rotation};
+use skinsplat_core::math::{Matrix3, Quaternion, dot4, matrix3, rotation};
 use skinsplat_core::scene::{AvatarGradient, Gaussians, PosedGradient, SceneError};
 
 /// Adds to `gradient` what the pose of a frame contributes. See [`Poser::backward`](super::Poser::backward).
@@ -36,6 +37,7 @@ pub(super) fn add(
             gradient,
             relative: Vec::new(),
             growth: Vec::new(),
+            rest_means: Vec::new(),
         }
         .run();
     });
@@ -115,6 +117,8 @@ struct AdjointChunk<'f, 'a, 'o> {
     relative: Vec<Quaternion<f32>>,
     /// By how much each Gaussian grows; empty unless joints scale and offsets follow.
     growth: Vec<f32>,
+    /// With respect to the rest means, of face-bound Gaussians whose covariance or R depends on them; else empty.
+    rest_means: Vec<Vec3>,
 }
 
 impl AdjointChunk<'_, '_, '_> {
@@ -126,6 +130,9 @@ impl AdjointChunk<'_, '_, '_> {
         }
         if frame.offsets_grow() {
             self.growth.resize(self.gradient.means.len(), 1.0);
+        }
+        if frame.tangents.is_some() && frame.bound.moves == Moves::WithFaces {
+            self.rest_means.resize(self.gradient.means.len(), Vec3::ZERO);
         }
         let chunk = &frame.bound.chunks(frame.strategy.covariance)[self.number];
         frame.walk(chunk, self.start, &mut self);
@@ -148,7 +155,7 @@ impl AdjointChunk<'_, '_, '_> {
         for (i, (barycentric, offset)) in places.enumerate() {
             let gaussian = self.start + i;
             let (embedding, of_mean) = (&surface.embeddings[gaussian], self.upstream.means[gaussian]);
-            let (of_barycentric, of_offset) = match self.frame.face_motion(gaussian) {
+            let (of_barycentric, mut of_offset) = match self.frame.face_motion(gaussian) {
                 Some(motion) => embedding.point_adjoint(&surface.faces.mesh, motion.adjoint(of_mean)),
                 None => {
                     let growth = self.growth.get(i).copied().unwrap_or(1.0);
@@ -156,6 +163,10 @@ impl AdjointChunk<'_, '_, '_> {
                     (of_barycentric, of_offset * growth)
                 }
             };
+            if let Some(&of_rest) = self.rest_means.get(i) {
+                // Coordinates are followed into positions only: weights would move along with them.
+                of_offset += embedding.point_adjoint(&surface.faces.mesh, of_rest).1;
+            }
             barycentric.iter_mut().zip(of_barycentric).for_each(|(sum, own)| *sum += own);
             *offset += of_offset;
         }
@@ -250,8 +261,18 @@ impl AdjointChunk<'_, '_, '_> {
             (CovarianceChoice::Rotate | CovarianceChoice::Surfel, torque) => {
                 rotation_adjoint(self.frame.arch, source, input, rotated, of_covariance, torque.as_ref())
             }
-            (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, None) => *of_covariance,
-            (CovarianceChoice::Affine | CovarianceChoice::AffineConjugate, torque) => {
+            (CovarianceChoice::RotateByAverage, torque) => {
+                let of_canonical = drawn_adjoint(rotated, of_covariance);
+                if torque.is_none() {
+                    return of_canonical;
+                }
+                let none = [[0.0; LANES]; 4];
+                let of_colour =
+                    rotation_adjoint(self.frame.arch, source, input, rotated, &none, torque.as_ref());
+                lanes::sum(&of_canonical, &of_colour)
+            }
+            (_, None) => *of_covariance,
+            (_, torque) => {
                 let none = [[0.0; LANES]; 4];
                 let of_colour =
                     rotation_adjoint(self.frame.arch, source, input, rotated, &none, torque.as_ref());
@@ -272,6 +293,56 @@ impl AdjointChunk<'_, '_, '_> {
             (0..3).for_each(|axis| torque[axis][lane] = of_lane[axis]);
         }
         torque
+    }
+
+    /// Adds to the derivatives with respect to canonical means what comes through the derivative J of LBS: by the covariance that
+    /// J deforms, by the SH and the covariance that its nearest rotation turns.
+    #[inline(never)]
+    fn through_jacobian(
+        &mut self,
+        position: usize,
+        input: &BlockInput<'_>,
+        rotated: &Rotated,
+        scales: &[Lanes; 3],
+        (of_factors, of_posed): (&[Lanes; 9], &[Lanes; 4]),
+        means: &mut [Lanes; 3],
+    ) {
+        let (Some(tangents), Some(jacobian)) = (self.frame.tangents, input.jacobian) else { return };
+        let (covariance, source) = (self.frame.strategy.covariance, self.frame.source.across());
+        let of_block = Derivative {
+            joints: input.joints,
+            chunk: input.chunk,
+            position,
+            tangents: &tangents[self.number],
+            blend: input.blend,
+        };
+        let torque = (source.is_some() && self.rotates_sh()).then(|| self.torque(input, rotated));
+        let turns = matches!(covariance, CovarianceChoice::Rotate | CovarianceChoice::Surfel);
+        for lane in 0..input.block.count {
+            let mut of_mean = [0.0; 3];
+            let mut add = |across: Across, upstream: &Matrix3<f32>| {
+                of_mean =
+                    matrix3::add_scaled(of_mean, 1.0, of_block.adjoint(jacobian, across, lane, upstream));
+            };
+            if let Some(across) = covariance.across() {
+                add(across, &covariance::map_adjoint(&input.block.rotations, scales, of_factors, lane));
+            }
+            if let Some(across) = source {
+                let own = torque.as_ref().map_or([0.0; 3], |t| [0, 1, 2].map(|axis: usize| t[axis][lane]));
+                let posed = if turns {
+                    torque_of(take(&rotated.posed, lane), take(of_posed, lane))
+                } else {
+                    [0.0; 3]
+                };
+                let torque = matrix3::add_scaled(own, 1.0, posed);
+                let j = lanes::matrix(jacobian.of(across), lane);
+                add(across, &polar_adjoint(&j, take(&rotated.relative, lane), torque));
+            }
+            match self.rest_means.get_mut(usize::from(input.block.index[lane])) {
+                Some(sum) => *sum += Vec3::from_array(of_mean),
+                None => (0..3).for_each(|axis| means[axis][lane] += of_mean[axis]),
+            }
+        }
     }
 
     /// From the discs of a block to its Gaussians.
@@ -326,13 +397,23 @@ impl AdjointChunk<'_, '_, '_> {
     }
 }
 
+/// The derivative with respect to a further rotation of the world, from that with respect to a quaternion it turns.
+fn torque_of(q: Quaternion<f32>, gradient: Quaternion<f32>) -> [f32; 3] {
+    [0, 1, 2].map(|axis: usize| {
+        let mut turn = [0.0; 4];
+        turn[axis + 1] = 0.5;
+        dot4(rotation::multiply(turn, q), gradient)
+    })
+}
+
 impl Visitor for AdjointChunk<'_, '_, '_> {
     #[inline(always)]
     fn block(&mut self, position: usize, input: &BlockInput<'_>, rotated: &Rotated, scales: &[Lanes; 3]) {
         let (block, choice) = (input.block, self.frame.strategy.covariance);
         let of_factors = self.of_factors(block);
+        let map = covariance::deforming(choice, input);
         let of_covariance =
-            covariance::adjoint(choice, &rotated.posed, input.blend, &block.rotations, scales, &of_factors);
+            covariance::adjoint(choice, &rotated.posed, map, &block.rotations, scales, &of_factors);
         let mut log_scales = of_covariance.log_scales;
         let mut rotations = self.of_rotations(input, rotated, &of_covariance.rotation);
         let mut units = &block.rotations;
@@ -342,7 +423,11 @@ impl Visitor for AdjointChunk<'_, '_, '_> {
             units = &own.blocks[position].rotations;
         }
         let stored = self.of_stored(input, units, &rotations);
-        let means = self.of_means(input, rotated);
+        let mut means = self.of_means(input, rotated);
+        if input.jacobian.is_some() {
+            let of_drawn = (&of_factors, &of_covariance.rotation);
+            self.through_jacobian(position, input, rotated, scales, of_drawn, &mut means);
+        }
         self.add(block, &means, &stored, &log_scales);
         if let (false, Some(growth)) = (self.growth.is_empty(), input.growth()) {
             for lane in 0..block.count {

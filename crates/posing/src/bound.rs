@@ -4,6 +4,7 @@ use super::error::expect_count;
 use super::groups::{self, Group};
 use super::layout::{self, CHUNK, Chunk};
 use super::nearest::NearestFace;
+use super::push_forward::{self, Tangents};
 use super::surface::{self, Embedding, Surface};
 use super::{CovarianceChoice, PosingError, Strategy, surfel};
 use glam::Vec3;
@@ -24,6 +25,7 @@ pub struct BoundAvatar {
     chunks: Vec<Chunk>,
     discs: OnceLock<Vec<Chunk>>,
     groups: OnceLock<Vec<Group>>,
+    tangents: OnceLock<Vec<Tangents>>,
     pub(crate) means: Vec<Vec3>,
     pub(crate) surface: Option<Surface>,
     pub(crate) moves: Moves,
@@ -145,6 +147,7 @@ impl BoundAvatar {
             chunks: layout::chunks(n, weights),
             discs: OnceLock::new(),
             groups: OnceLock::new(),
+            tangents: OnceLock::new(),
             means: vec![Vec3::ZERO; n],
             surface: embeddings.map(|embeddings| Surface::new(embeddings, body)),
             moves,
@@ -248,6 +251,15 @@ impl BoundAvatar {
             }
             _ => &self.chunks,
         }
+    }
+
+    /// How weights change along the surface, by chunk; `None` for avatars that know no faces. Gathered when first asked for,
+    /// from the body that the avatar was bound to.
+    pub(crate) fn tangents(&self, body: &RestBody) -> Option<&[Tangents]> {
+        let surface = self.surface.as_ref()?;
+        let on_faces = self.moves == Moves::WithFaces;
+        let gather = || push_forward::tangents(&self.chunks, surface, on_faces, body);
+        Some(self.tangents.get_or_init(gather).as_slice())
     }
 
     /// The Gaussians by their joints. Gathered when first asked for; weights do not change after binding.

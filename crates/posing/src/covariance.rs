@@ -1,37 +1,49 @@
 //! The covariance axis: factors M with Σ = M Mᵀ, a block at a time, forwards and backwards.
 
 use super::CovarianceChoice;
-use super::blend::Blend;
 use super::lanes::{self, LANES, Lanes, take};
+use super::rotate::BlockInput;
 use skinsplat_core::math::{Matrix3, Quaternion, matrix3, rotation};
 
-/// M per lane, row-major, from the posed quaternions or the blend.
+/// M per lane, row-major, from the posed quaternions or the map that deforms (see [`deforming`]).
 #[inline(always)]
 pub(super) fn factors(
     choice: CovarianceChoice,
     posed: &[Lanes; 4],
-    blend: &Blend,
+    map: &[Lanes; 9],
     canonical: &[Lanes; 4],
     scales: &[Lanes; 3],
 ) -> [Lanes; 9] {
     let mut factors = [[0.0; LANES]; 9];
     match choice {
-        CovarianceChoice::Rotate | CovarianceChoice::Surfel => {
+        CovarianceChoice::Rotate | CovarianceChoice::RotateByAverage | CovarianceChoice::Surfel => {
             for lane in 0..LANES {
                 let rotation = rotation::quaternion_to_matrix_raw(take(posed, lane));
                 put(&mut factors, lane, &rotation, scales);
             }
         }
-        CovarianceChoice::Affine | CovarianceChoice::AffineConjugate => {
-            let sign = if choice == CovarianceChoice::Affine { 1.0 } else { -1.0 };
+        CovarianceChoice::Affine
+        | CovarianceChoice::AffineConjugate
+        | CovarianceChoice::PushForward
+        | CovarianceChoice::PushForwardNormal => {
+            let sign = if choice == CovarianceChoice::AffineConjugate { -1.0 } else { 1.0 };
             for lane in 0..LANES {
                 let [w, x, y, z] = take(canonical, lane);
                 let own = rotation::quaternion_to_matrix_raw([w, sign * x, sign * y, sign * z]);
-                put(&mut factors, lane, &product(&blend.matrix(lane), &own), scales);
+                put(&mut factors, lane, &product(&lanes::matrix(map, lane), &own), scales);
             }
         }
     }
     factors
+}
+
+/// What deforms covariances: the blend, or the derivative of LBS where the choice asks for it.
+#[inline(always)]
+pub(super) fn deforming<'a>(choice: CovarianceChoice, input: &BlockInput<'a>) -> &'a [Lanes; 9] {
+    match (choice.across(), input.jacobian) {
+        (Some(across), Some(jacobian)) => jacobian.of(across),
+        _ => &input.blend.linear,
+    }
 }
 
 /// Derivatives with respect to what [`factors`] read.
@@ -47,26 +59,29 @@ pub(super) struct CovarianceGradient {
 pub(super) fn adjoint(
     choice: CovarianceChoice,
     posed: &[Lanes; 4],
-    blend: &Blend,
+    map: &[Lanes; 9],
     canonical: &[Lanes; 4],
     scales: &[Lanes; 3],
     gradient: &[Lanes; 9],
 ) -> CovarianceGradient {
     let mut result = CovarianceGradient { rotation: [[0.0; LANES]; 4], log_scales: [[0.0; LANES]; 3] };
     match choice {
-        CovarianceChoice::Rotate | CovarianceChoice::Surfel => {
+        CovarianceChoice::Rotate | CovarianceChoice::RotateByAverage | CovarianceChoice::Surfel => {
             for lane in 0..LANES {
                 let q = take(posed, lane);
                 let of_matrix = scaled(&lanes::matrix(gradient, lane), scales, lane);
                 result.put(lane, q, &of_matrix);
             }
         }
-        CovarianceChoice::Affine | CovarianceChoice::AffineConjugate => {
-            let sign = if choice == CovarianceChoice::Affine { 1.0 } else { -1.0 };
+        CovarianceChoice::Affine
+        | CovarianceChoice::AffineConjugate
+        | CovarianceChoice::PushForward
+        | CovarianceChoice::PushForwardNormal => {
+            let sign = if choice == CovarianceChoice::AffineConjugate { -1.0 } else { 1.0 };
             for lane in 0..LANES {
                 let [w, x, y, z] = take(canonical, lane);
                 let of_product = scaled(&lanes::matrix(gradient, lane), scales, lane);
-                let of_own = product(&matrix3::transpose(blend.matrix(lane)), &of_product);
+                let of_own = product(&matrix3::transpose(lanes::matrix(map, lane)), &of_product);
                 result.put(lane, [w, sign * x, sign * y, sign * z], &of_own);
             }
             for imaginary in &mut result.rotation[1..] {
@@ -75,6 +90,18 @@ pub(super) fn adjoint(
         }
     }
     result
+}
+
+/// The derivative with respect to the deforming map of one lane, G (R_c S)ᵀ, from that with respect to M.
+pub(super) fn map_adjoint(
+    canonical: &[Lanes; 4],
+    scales: &[Lanes; 3],
+    gradient: &[Lanes; 9],
+    lane: usize,
+) -> Matrix3<f32> {
+    let own = rotation::quaternion_to_matrix_raw(take(canonical, lane));
+    let shape = scaled(&own, scales, lane);
+    product(&lanes::matrix(gradient, lane), &matrix3::transpose(shape))
 }
 
 impl CovarianceGradient {

@@ -7,10 +7,11 @@ use super::face_frame;
 use super::frustum::Frustum;
 use super::joints::Joints;
 use super::lanes::{LANES, Lanes};
-use super::layout::Chunk;
+use super::layout::{CHUNK, Chunk};
 use super::options::PoseOptions;
-use super::rotate::{BlockInput, Rotated, Source, rotate};
-use super::{BoundAvatar, ColourChoice, CovarianceChoice, PosingError, Strategy};
+use super::push_forward::{Derivative, Tangents};
+use super::rotate::{BlockInput, Rotated, Source, rotate, rotate_by_average};
+use super::{Across, BoundAvatar, ColourChoice, CovarianceChoice, PosingError, Strategy};
 use glam::{Quat, Vec3};
 use skinsplat_core::math::{Quaternion, dot4};
 use skinsplat_core::scene::{Camera, PosedBody, SceneError};
@@ -28,6 +29,10 @@ pub(super) struct Frame<'a> {
     /// That of the only camera that will look, if what it does not see may be left out.
     frustum: Option<Frustum>,
     pub(super) arch: pulp::Arch,
+    /// Of each chunk, where the strategy reads the derivative of LBS.
+    pub(super) tangents: Option<&'a [Tangents]>,
+    /// It also reads that with the normal carried.
+    with_normal: bool,
 }
 
 /// What a walk does with each block.
@@ -52,7 +57,10 @@ impl<'a> Frame<'a> {
     ) -> Result<Self, PosingError> {
         bound.check_body(body)?;
         let reads_faces = options.rotations.is_none() && strategy.rotation.needs_faces();
-        let needs_faces = reads_faces || strategy.covariance == CovarianceChoice::Surfel;
+        let [of_rotation, of_covariance] = strategy.across();
+        let across = [of_rotation.filter(|_| options.rotations.is_none()), of_covariance];
+        let pushes = across.iter().any(Option::is_some);
+        let needs_faces = reads_faces || pushes || strategy.covariance == CovarianceChoice::Surfel;
         if needs_faces && bound.surface.is_none() && bound.moves != Moves::Not {
             return Err(PosingError::NoFaces { strategy: strategy.to_string() });
         }
@@ -70,7 +78,10 @@ impl<'a> Frame<'a> {
             }
             None => Source::Identity,
         };
-        let frame = Self { bound, body, strategy, joints, source, frustum: None, arch };
+        let tangents = if pushes { bound.tangents(body.rest) } else { None };
+        let with_normal = across.contains(&Some(Across::Normal));
+        let frame =
+            Self { bound, body, strategy, joints, source, frustum: None, arch, tangents, with_normal };
         Ok(Self { frustum: options.seen_by.and_then(|camera| frame.frustum_of(camera)), ..frame })
     }
 
@@ -152,15 +163,24 @@ impl<V: Visitor> pulp::WithSimd for Walk<'_, '_, V> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { frame, chunk, start, visitor } = self;
+        let tangents = frame.tangents.map(|tangents| &tangents[start / CHUNK]);
         for (position, block) in chunk.blocks.iter().enumerate() {
             let (indices, weights) = chunk.influences(block);
             let blend = Blend::new(&frame.joints, indices, weights);
-            let input = BlockInput { joints: &frame.joints, chunk, block, start, blend: &blend };
+            let jacobian = tangents.map(|tangents| {
+                let of_block = Derivative { joints: &frame.joints, chunk, position, tangents, blend: &blend };
+                of_block.jacobian(frame.arch, frame.with_normal)
+            });
+            let (joints, jacobian) = (&frame.joints, jacobian.as_ref());
+            let input = BlockInput { joints, chunk, block, start, blend: &blend, jacobian };
             if let Some(means) = frame.frustum.as_ref().and_then(|frustum| frustum.culls(block, &blend)) {
                 visitor.culled(&input, &means);
                 continue;
             }
-            let rotated = rotate(frame.arch, &frame.source, &input);
+            let mut rotated = rotate(frame.arch, &frame.source, &input);
+            if frame.strategy.covariance == CovarianceChoice::RotateByAverage {
+                rotate_by_average(frame.arch, &input, &mut rotated);
+            }
             let scales = match (frame.source.scaled_faces(), &frame.joints.scale) {
                 (Some(_), _) => frame.grown(&input),
                 (None, Some(_)) if frame.strategy.covariance.keeps_shape() => grown_with_joints(&input),
@@ -202,7 +222,11 @@ fn check_rotations(rotations: &[Quaternion<f32>], n: usize) -> Result<(), SceneE
 fn reads_rotation(strategy: &Strategy) -> bool {
     let for_covariance = match strategy.covariance {
         CovarianceChoice::Rotate | CovarianceChoice::Surfel => true,
-        CovarianceChoice::Affine | CovarianceChoice::AffineConjugate => false,
+        CovarianceChoice::Affine
+        | CovarianceChoice::AffineConjugate
+        | CovarianceChoice::PushForward
+        | CovarianceChoice::PushForwardNormal
+        | CovarianceChoice::RotateByAverage => false,
     };
     let for_colour = match strategy.colour {
         ColourChoice::RotateSh | ColourChoice::ViewRotation => true,

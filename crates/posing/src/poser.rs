@@ -2,7 +2,7 @@
 
 use super::adjoint;
 use super::bound::Moves;
-use super::covariance::factors;
+use super::covariance::{self, factors};
 use super::frame::{Frame, Visitor};
 use super::lanes::{Lanes, take};
 use super::layout::CHUNK;
@@ -156,7 +156,11 @@ impl Produces {
     fn of(Frame { bound, strategy, source, .. }: &Frame<'_>) -> Self {
         let rotations = match strategy.covariance {
             CovarianceChoice::Rotate | CovarianceChoice::Surfel => !source.is_raw(),
-            CovarianceChoice::Affine | CovarianceChoice::AffineConjugate => false,
+            CovarianceChoice::RotateByAverage => true,
+            CovarianceChoice::Affine
+            | CovarianceChoice::AffineConjugate
+            | CovarianceChoice::PushForward
+            | CovarianceChoice::PushForwardNormal => false,
         };
         let (view_frames, sh) = match strategy.colour {
             ColourChoice::None => (false, false),
@@ -260,7 +264,8 @@ impl Visitor for PoseChunk<'_, '_, '_> {
     fn block(&mut self, _: usize, input: &BlockInput<'_>, rotated: &Rotated, scales: &[Lanes; 3]) {
         let Frame { bound, strategy, .. } = self.frame;
         let block = input.block;
-        let factors = factors(strategy.covariance, &rotated.posed, input.blend, &block.rotations, scales);
+        let map = covariance::deforming(strategy.covariance, input);
+        let factors = factors(strategy.covariance, &rotated.posed, map, &block.rotations, scales);
         let means = match (bound.moves, &rotated.means) {
             (Moves::Not | Moves::WithFaces, _) => block.means,
             (Moves::ByWeights, Some(means)) => *means,

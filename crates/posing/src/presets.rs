@@ -1,7 +1,7 @@
-//! The paper's four strategies, the stock methods that it compares with ("Original" in Tables 1-5), and one more.
+//! The paper's four strategies, the stock methods that it compares with ("Original" in Tables 1-5), and more.
 
 use super::{
-    ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
+    Across, ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
 };
 use skinsplat_core::math::average::Solver;
 use skinsplat_core::math::rotation::SignPolicy;
@@ -118,6 +118,50 @@ pub const PRESETS: &[Preset] = &[
             covariance: CovarianceChoice::AffineConjugate,
             colour: ColourChoice::ViewBlend,
             clamp: ClampChoice::Unit,
+        },
+    },
+    Preset {
+        id: "push-forward",
+        title: "Push-forward",
+        summary: "covariance deformed by the derivative of LBS with its weights' gradients, SH rotated by its nearest rotation",
+        strategy: Strategy {
+            rotation: RotationChoice::PushForward(Across::Constant),
+            covariance: CovarianceChoice::PushForward,
+            colour: ColourChoice::RotateSh,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "push-forward-normal",
+        title: "Push-forward, thickness kept",
+        summary: "the same, the normal carried to the posed normal with its length kept",
+        strategy: Strategy {
+            rotation: RotationChoice::PushForward(Across::Normal),
+            covariance: CovarianceChoice::PushForwardNormal,
+            colour: ColourChoice::RotateSh,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "push-forward-average-sh",
+        title: "Push-forward, SH by the average",
+        summary: "covariance as push-forward-normal, SH rotated by the quaternion average: what the covariance alone is worth",
+        strategy: Strategy {
+            rotation: RotationChoice::QuaternionAverage(Solver::ClosedForm),
+            covariance: CovarianceChoice::PushForwardNormal,
+            colour: ColourChoice::RotateSh,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "average-push-forward-sh",
+        title: "Average, SH by the push-forward",
+        summary: "covariance rotated by the quaternion average, SH as push-forward-normal: what the turn of SH alone is worth",
+        strategy: Strategy {
+            rotation: RotationChoice::PushForward(Across::Normal),
+            covariance: CovarianceChoice::RotateByAverage,
+            colour: ColourChoice::RotateSh,
+            clamp: ClampChoice::NonNegative,
         },
     },
 ];

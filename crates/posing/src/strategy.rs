@@ -1,6 +1,6 @@
 //! The axes of a strategy as plain data: closed enums, each variant with a stable id. (The rotation's are in `rotate`.)
 
-use super::{PosingError, RotationChoice, joints};
+use super::{Across, PosingError, RotationChoice, joints};
 use skinsplat_core::scene::{ColourClamp, PosedBody};
 use std::fmt;
 use std::str::FromStr;
@@ -36,6 +36,13 @@ pub enum CovarianceChoice {
     Affine,
     /// B R_cᵀ S² R_c Bᵀ: as `Affine` with R_c transposed, as Animatable's kernel fills its matrix.
     AffineConjugate,
+    /// J Σ_c Jᵀ with the derivative J of the map that carries the means, weights constant across the surface: what LBS does to
+    /// a small Gaussian.
+    PushForward,
+    /// The same, with the normal carried to the posed normal and its length kept.
+    PushForwardNormal,
+    /// A Σ_c Aᵀ with the quaternion average A (Eq. 7), whatever R turns the SH: to tell their parts in a difference apart.
+    RotateByAverage,
     /// R Σ_c Rᵀ for the nearest disc of iHuman: R_c snapped to \[n | r1' | r2'\] of the rest face, 1 mm thick.
     Surfel,
 }
@@ -114,6 +121,9 @@ named!(
         ("rotate", Rotate, "rotated by R"),
         ("affine", Affine, "deformed by the blended matrix B"),
         ("affine-conjugate", AffineConjugate, "deformed by B with R_c transposed: Animatable's kernel"),
+        ("push-forward", PushForward, "deformed by J, the derivative of LBS with its weights' gradients"),
+        ("push-forward-normal", PushForwardNormal, "the same, the length across the surface kept"),
+        ("rotate-by-average", RotateByAverage, "rotated by the quaternion average, whatever R is"),
         ("surfel", Surfel, "rotated by R as the nearest disc of the face, 1 mm thick: iHuman"),
     ]
 );
@@ -149,13 +159,29 @@ impl CovarianceChoice {
     /// True if the covariance is rotated and keeps its shape, so that it has to be told of joints that scale.
     pub(crate) fn keeps_shape(self) -> bool {
         match self {
-            Self::Rotate | Self::Surfel => true,
-            Self::Affine | Self::AffineConjugate => false,
+            Self::Rotate | Self::RotateByAverage | Self::Surfel => true,
+            Self::Affine | Self::AffineConjugate | Self::PushForward | Self::PushForwardNormal => false,
+        }
+    }
+
+    /// How J goes on across the surface, where it is read.
+    pub(crate) fn across(self) -> Option<Across> {
+        match self {
+            Self::PushForward => Some(Across::Constant),
+            Self::PushForwardNormal => Some(Across::Normal),
+            Self::Rotate | Self::RotateByAverage | Self::Surfel | Self::Affine | Self::AffineConjugate => {
+                None
+            }
         }
     }
 }
 
 impl Strategy {
+    /// The ways across the surface in which the derivative of LBS is read: by the rotation, by the covariance.
+    pub(crate) fn across(&self) -> [Option<Across>; 2] {
+        [self.rotation.across(), self.covariance.across()]
+    }
+
     /// The first joint of a posed body that scales by unequal factors, which a strategy that only rotates Gaussians cannot
     /// follow; `None` if there is none, or the strategy deforms covariances.
     pub fn ignored_scale(&self, body: &PosedBody<'_>) -> Option<usize> {

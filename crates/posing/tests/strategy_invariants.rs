@@ -45,8 +45,10 @@ fn seen(posed: &OwnedPosed, i: usize, direction: DVec3) -> DVec3 {
 }
 
 fn proper(strategy: &Strategy) -> bool {
-    matches!(strategy.covariance, CovarianceChoice::Rotate | CovarianceChoice::Surfel)
-        && strategy.rotation.to_string() != "matrix-to-quaternion-raw"
+    let by_average = strategy.covariance == CovarianceChoice::RotateByAverage;
+    by_average
+        || matches!(strategy.covariance, CovarianceChoice::Rotate | CovarianceChoice::Surfel)
+            && strategy.rotation.to_string() != "matrix-to-quaternion-raw"
 }
 
 proptest! {

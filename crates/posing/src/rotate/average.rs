@@ -105,7 +105,7 @@ fn normalised_sum(joints: &Joints, indices: &[u16], weights: &[Lanes]) -> Option
 
 /// Three joints or more. A function of its own, small enough for the compiler to inline all that is in it.
 #[inline(never)]
-fn dominant(arch: pulp::Arch, rotations: &[Lanes; 9], weight: &Lanes) -> lanes::Lanes<LANES> {
+pub(super) fn dominant(arch: pulp::Arch, rotations: &[Lanes; 9], weight: &Lanes) -> lanes::Lanes<LANES> {
     arch.dispatch(Dominant { rotations, weight })
 }
 

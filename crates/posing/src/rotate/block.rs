@@ -4,6 +4,7 @@ use super::super::blend::{self, Blend};
 use super::super::joints::Joints;
 use super::super::lanes::{LANES, Lanes, put};
 use super::super::layout::{Block, Chunk};
+use super::super::push_forward::Jacobian;
 use super::average;
 use skinsplat_core::math::Quaternion;
 use skinsplat_core::math::average::Solver;
@@ -12,6 +13,8 @@ use skinsplat_core::math::average::Solver;
 pub(crate) struct Rotated {
     /// R relative to the rest pose, as unit quaternions.
     pub(crate) relative: [Lanes; 4],
+    /// What R_c is multiplied by where it is drawn: R, or the quaternion average.
+    pub(crate) drawn_by: [Lanes; 4],
     /// The quaternions that are drawn: R ⊗ R_c, of unit length except for a raw conversion.
     pub(crate) posed: [Lanes; 4],
     /// The posed means, where the rotation comes with a motion of its own.
@@ -26,6 +29,8 @@ pub(crate) struct BlockInput<'a> {
     /// Index of the chunk's first Gaussian.
     pub(crate) start: usize,
     pub(crate) blend: &'a Blend,
+    /// Where the strategy reads it.
+    pub(crate) jacobian: Option<&'a Jacobian>,
 }
 
 impl BlockInput<'_> {

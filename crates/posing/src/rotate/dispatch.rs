@@ -2,7 +2,8 @@
 
 use super::super::lanes::{LANES, Lanes, identity, multiply, put, take};
 use super::block::{BlockInput, Rotated};
-use super::{LbsProjection, Source, average, dual, lbs};
+use super::{LbsProjection, Source, average, dual, lbs, polar};
+use skinsplat_core::math::average::Solver;
 use skinsplat_core::math::rotation;
 
 /// Rotates a block.
@@ -10,7 +11,8 @@ use skinsplat_core::math::rotation;
 pub(crate) fn rotate(arch: pulp::Arch, source: &Source<'_>, input: &BlockInput<'_>) -> Rotated {
     let (indices, weights) = input.chunk.influences(input.block);
     if indices.is_empty() {
-        return Rotated { relative: identity(), posed: input.block.rotations, means: None };
+        let still = identity();
+        return Rotated { relative: still, drawn_by: still, posed: input.block.rotations, means: None };
     }
     let mut means = None;
     let relative = match source {
@@ -32,11 +34,21 @@ pub(crate) fn rotate(arch: pulp::Arch, source: &Source<'_>, input: &BlockInput<'
             });
             motions.real
         }
+        Source::PushForward(across) => polar::of_block(arch, input, *across),
         Source::Faces(faces) => faces.of_block(input),
         Source::PerBlock(rotations) => rotations(input),
     };
     let posed = multiply(&relative, &input.block.rotations);
-    Rotated { relative, posed, means }
+    Rotated { relative, drawn_by: relative, posed, means }
+}
+
+/// Draws a block rotated by the quaternion average, whatever R is.
+#[inline(never)]
+pub(crate) fn rotate_by_average(arch: pulp::Arch, input: &BlockInput<'_>, rotated: &mut Rotated) {
+    let (indices, weights) = input.chunk.influences(input.block);
+    rotated.drawn_by =
+        average::average(arch, input.joints, indices, weights, input.blend, Solver::ClosedForm);
+    rotated.posed = multiply(&rotated.drawn_by, &input.block.rotations);
 }
 
 /// The derivatives with respect to the canonical quaternions (to first order on the unit sphere) from those with respect
@@ -55,15 +67,19 @@ pub(crate) fn rotation_adjoint(
         Source::Lbs(projection) if projection.converts() && !input.block.influences.is_empty() => {
             lbs::converted_adjoint(arch, *projection, input, rotated, posed, torque)
         }
-        _ => {
-            let mut canonical = [[0.0; LANES]; 4];
-            for lane in 0..LANES {
-                let back = rotation::conjugate(take(&rotated.relative, lane));
-                put(&mut canonical, lane, rotation::multiply(back, take(posed, lane)));
-            }
-            canonical
-        }
+        _ => drawn_adjoint(rotated, posed),
     }
+}
+
+/// The same, where R_c is multiplied by [`Rotated::drawn_by`].
+#[inline(always)]
+pub(crate) fn drawn_adjoint(rotated: &Rotated, posed: &[Lanes; 4]) -> [Lanes; 4] {
+    let mut canonical = [[0.0; LANES]; 4];
+    for lane in 0..LANES {
+        let back = rotation::conjugate(take(&rotated.drawn_by, lane));
+        put(&mut canonical, lane, rotation::multiply(back, take(posed, lane)));
+    }
+    canonical
 }
 
 /// Each lane of three axes times its factor.

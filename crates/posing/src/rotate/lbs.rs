@@ -76,7 +76,8 @@ pub(super) fn converted(arch: pulp::Arch, projection: LbsProjection, input: &Blo
     let mut back = *canonical;
     back[1..].as_flattened_mut().iter_mut().for_each(|c| *c = -*c);
     let raw_is_drawn = projection == LbsProjection::MatrixToQuaternionRaw;
-    Rotated { relative: multiply(&unit, &back), posed: if raw_is_drawn { raw } else { unit }, means: None }
+    let relative = multiply(&unit, &back);
+    Rotated { relative, drawn_by: relative, posed: if raw_is_drawn { raw } else { unit }, means: None }
 }
 
 /// The conversion of a block.

@@ -10,16 +10,18 @@ mod dual;
 mod faces;
 mod lbs;
 mod lifted;
+mod polar;
 
 pub(crate) use block::{BlockInput, Rotated};
-pub(crate) use dispatch::{means_adjoint, rotate, rotation_adjoint};
+pub(crate) use dispatch::{drawn_adjoint, means_adjoint, rotate, rotate_by_average, rotation_adjoint};
 pub use lbs::LbsProjection;
+pub(crate) use polar::adjoint as polar_adjoint;
 
 use super::face_frame::FaceFrame;
 use super::joints::Joints;
 use super::lanes::Lanes;
 use super::surface::Surface;
-use super::{JointLift, PosingError};
+use super::{Across, JointLift, PosingError};
 use faces::{FaceRotations, VertexRotations};
 use skinsplat_core::math::Quaternion;
 use skinsplat_core::math::average::Solver;
@@ -47,6 +49,8 @@ pub enum RotationChoice {
     /// The normalised sum of the joints' quaternions with signs that belong together ([`JointLift`]): as the average for
     /// nearby joints, and continuous where that jumps.
     LiftedSum,
+    /// The rotation nearest to J, the derivative of LBS with its weights' gradients: the rotation of the posed surface.
+    PushForward(Across),
     /// Dual-quaternion blending; the mean of a Gaussian with weights of its own follows it too.
     DualQuaternion,
 }
@@ -143,6 +147,16 @@ named_rotations![
         VertexQuaternions(SignPolicy::AlignToFirst)
     ),
     ("lifted-sum", "joint quaternions summed with signs that belong together: no jump at 180°", LiftedSum),
+    (
+        "push-forward",
+        "the rotation nearest to J, the derivative of LBS with its weights' gradients",
+        PushForward(Across::Constant)
+    ),
+    (
+        "push-forward-normal",
+        "the same, the normal of the surface carried to the posed one",
+        PushForward(Across::Normal)
+    ),
     ("dual-quaternion", "dual-quaternion blending, of the mean too", DualQuaternion),
 ];
 
@@ -158,7 +172,10 @@ impl RotationChoice {
     /// True if R is read from the posed mesh or from the face of the Gaussian.
     pub fn needs_faces(self) -> bool {
         match self {
-            Self::FaceFrame(_) | Self::VertexAverage(_) | Self::VertexQuaternions(_) => true,
+            Self::FaceFrame(_)
+            | Self::VertexAverage(_)
+            | Self::VertexQuaternions(_)
+            | Self::PushForward(_) => true,
             Self::Lbs(_) | Self::QuaternionAverage(_) | Self::LiftedSum | Self::DualQuaternion => false,
         }
     }
@@ -172,8 +189,14 @@ impl RotationChoice {
             | Self::QuaternionAverage(_)
             | Self::VertexAverage(_)
             | Self::VertexQuaternions(_)
+            | Self::PushForward(_)
             | Self::LiftedSum => false,
         }
+    }
+
+    /// How J goes on across the surface, where it is read.
+    pub(crate) fn across(self) -> Option<Across> {
+        if let Self::PushForward(across) = self { Some(across) } else { None }
     }
 }
 
@@ -226,6 +249,8 @@ pub(crate) enum Source<'a> {
     Dual,
     /// One rotation per face.
     Faces(FaceRotations<'a>),
+    /// The derivative of LBS.
+    PushForward(Across),
     /// Anything else: R of each lane, as unit quaternions.
     PerBlock(Box<BlockRotations<'a>>),
 }
@@ -244,6 +269,7 @@ impl<'a> Source<'a> {
             RotationChoice::Lbs(projection) => Self::Lbs(projection),
             RotationChoice::QuaternionAverage(solver) => Self::Average(solver),
             RotationChoice::DualQuaternion => Self::Dual,
+            RotationChoice::PushForward(across) => Self::PushForward(across),
             RotationChoice::FaceFrame(kind) => {
                 on(&|surface| Self::Faces(FaceRotations::new(kind, body, surface)))
             }
@@ -274,6 +300,11 @@ impl<'a> Source<'a> {
     /// True if the drawn quaternion is read from B R_c, so that R depends on R_c.
     pub(crate) fn converts(&self) -> bool {
         matches!(self, Self::Lbs(projection) if projection.converts())
+    }
+
+    /// How J goes on across the surface, where R is read from it, so that R depends on the mean.
+    pub(crate) fn across(&self) -> Option<Across> {
+        if let Self::PushForward(across) = self { Some(*across) } else { None }
     }
 
     /// True if the quaternion that is drawn is not of unit length.
