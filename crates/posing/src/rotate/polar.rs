@@ -57,7 +57,7 @@ pub(crate) fn adjoint(jacobian: &Matrix3<f32>, relative: Quaternion<f32>, torque
     let back = matrix3::apply(matrix3::transpose(r), torque.map(f64::from));
     let cofactors = [matrix3::cross(a[1], a[2]), matrix3::cross(a[2], a[0]), matrix3::cross(a[0], a[1])];
     let determinant = matrix3::dot(a[0], cofactors[0]);
-    if determinant.abs() <= SINGULAR * trace.abs().powi(3) {
+    if determinant.abs() <= SINGULAR * (trace * trace * trace).abs() {
         return [[0.0; 3]; 3];
     }
     // a is symmetric, and its cofactors with it.
