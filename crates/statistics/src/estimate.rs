@@ -68,6 +68,7 @@ mod tests {
     use super::*;
     use proptest::prelude::{prop_assert, prop_assert_eq, proptest};
     use skinsplat_core::math::portable;
+    use skinsplat_core::math::random::SplitMix64;
 
     fn series(subject: &str, seed: u64, sequence: &str, values: &[f64]) -> Series {
         Series { subject: subject.into(), seed, sequence: sequence.into(), values: values.to_vec() }
@@ -158,7 +159,9 @@ mod tests {
     #[test]
     fn correlated_frames_widen_the_interval_and_count_for_less() {
         let smooth: Vec<f64> = (0..64).map(|i| portable::sin(f64::from(i) * 0.2)).collect();
-        let shuffled: Vec<f64> = (0..64).map(|i| smooth[(i * 37) % 64]).collect();
+        let mut shuffled = smooth.clone();
+        let mut random = SplitMix64::new(1);
+        (1..64).for_each(|i| shuffled.swap(i, random.below(i + 1)));
         let width = |found: &Estimate| found.interval.map(|i| i.high - i.low).expect("enough frames");
         let (smooth, shuffled) = (of_one(&smooth), of_one(&shuffled));
         assert!(width(&smooth) > 2.0 * width(&shuffled), "{} {}", width(&smooth), width(&shuffled));
