@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const MODULES: [&str; 5] = ["check", "datasets", "experiment", "run", "report"];
 
 /// The crates, and what each may be built on. Tests and examples may use more.
-const CRATES: [(&str, &[&str]); 12] = [
+const CRATES: [(&str, &[&str]); 13] = [
     ("core", &[]),
     ("simd", &[]),
     ("table", &[]),
@@ -18,6 +18,7 @@ const CRATES: [(&str, &[&str]); 12] = [
     ("render", &["core", "simd"]),
     ("metrics", &["core", "simd", "lpips-alex"]),
     ("data", &["core"]),
+    ("statistics", &["core"]),
     ("synthetic", &["core", "data", "render"]),
     ("fit", &["core", "simd", "data", "posing", "render"]),
     ("study", &["core", "simd", "data", "fit", "metrics", "plot", "posing", "render", "synthetic", "table"]),

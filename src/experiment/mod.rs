@@ -12,6 +12,7 @@ mod avatar;
 mod catalog;
 mod dataset;
 mod embedded;
+mod equivalence;
 mod error;
 mod paper;
 mod plan;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use skinsplat_data::Capture;
 use skinsplat_metrics::MetricId;
 use skinsplat_posing::PRESETS;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// How the ids of variants begin that [`Experiment::with_all_strategies`] adds.
@@ -61,6 +62,9 @@ pub struct Experiment {
     /// and their spread.
     #[serde(default)]
     pub seeds: Vec<u64>,
+    /// Per metric, up to which difference two variants are as good as each other; see [`Experiment::margin`].
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub equivalence: BTreeMap<MetricId, f64>,
     /// What is compared, once per seed where there are several.
     pub variants: Vec<Variant>,
     /// The printed table, if there is one.
@@ -121,6 +125,9 @@ pub struct Column {
     /// Digits after the point; the metric's usual number if absent.
     #[serde(default)]
     pub decimals: Option<usize>,
+    /// Whether the experiment is about it, so that the best is bold: if absent, metrics of frames are, counts are not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outcome: Option<bool>,
 }
 
 impl Column {
@@ -132,6 +139,11 @@ impl Column {
     /// Digits after the point.
     pub fn decimals(&self) -> usize {
         self.decimals.unwrap_or(self.metric.decimals())
+    }
+
+    /// Whether the best of the column is bold.
+    pub fn is_outcome(&self) -> bool {
+        self.outcome.unwrap_or(self.metric.is_of_frames())
     }
 }
 

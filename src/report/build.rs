@@ -1,12 +1,13 @@
 //! Results to a [`Table`] and comparisons.
 
+use super::best;
 use super::captions::{caption, count, ran_on};
 use super::comparison::{Comparison, MetricDifference};
-use super::layout::{Entry, digits, mark_best_per_sequence, shape};
+use super::differences::Pair;
+use super::layout::{Entry, digits, shape};
 use super::paper::beside;
 use super::replicates::{Group, groups, spread};
 use super::results::{FrameResult, SequenceResults, VariantResults};
-use super::stats::paired;
 use crate::experiment::{Column, Experiment, Options, PlannedTable, Source};
 use skinsplat_metrics::MetricId;
 use skinsplat_table::{Cell, Content, RowKind, Table};
@@ -47,27 +48,27 @@ pub(super) fn table(
     let mut notes = Notes::default();
     let mut entries: Vec<Entry> = Vec::new();
     let groups = sequences.first().map_or_else(Vec::new, |first| groups(experiment, &first.variants));
-    for sequence in sequences {
-        for group in &groups {
-            let entry = measured(experiment, sequence, group, &mut notes);
-            let id = &sequence.variants[group.members[0]].id;
-            let compared = beside(experiment, planned.source, id, &entry, &mut notes);
+    let mut add = |mut block: Vec<Entry>, over: &[SequenceResults], notes: &mut Notes| {
+        best::mark(experiment, over, &groups, &mut block);
+        for (entry, group) in block.into_iter().zip(&groups) {
+            let id = &over[0].variants[group.members[0]].id;
+            let compared = beside(experiment, planned.source, id, &entry, notes);
             entries.push(entry);
             entries.extend(compared);
         }
+    };
+    for sequence in sequences {
+        let block = groups.iter().map(|group| measured(experiment, sequence, group, &mut notes)).collect();
+        add(block, std::slice::from_ref(sequence), &mut notes);
     }
     if let Some(average) = &experiment.average
         && !sequences.is_empty()
     {
-        for group in &groups {
-            let entry = mean(experiment, &average.label, sequences, group, &mut notes);
-            let id = &sequences[0].variants[group.members[0]].id;
-            let compared = beside(experiment, planned.source, id, &entry, &mut notes);
-            entries.push(entry);
-            entries.extend(compared);
-        }
+        let label = &average.label;
+        let block =
+            groups.iter().map(|group| mean(experiment, label, sequences, group, &mut notes)).collect();
+        add(block, sequences, &mut notes);
     }
-    mark_best_per_sequence(&mut entries, &experiment.columns);
     let shape = shape(experiment.layout, &experiment.columns, entries);
     Table {
         sentences: [caption(experiment, planned.source)]
@@ -218,7 +219,7 @@ pub(super) fn comparisons(experiment: &Experiment, sequences: &[SequenceResults]
         sequence,
         variant: group.label.clone(),
         baseline: baseline.label.clone(),
-        differences: differences(experiment, over, &pairs(baseline, group)),
+        differences: differences(experiment, over, Pair { candidate: group, baseline }),
     };
     let mut all: Vec<Comparison> = Vec::new();
     for sequence in sequences {
@@ -231,43 +232,16 @@ pub(super) fn comparisons(experiment: &Experiment, sequences: &[SequenceResults]
     all
 }
 
-/// (baseline, variant) per seed; a variant without seeds is compared with every one of the other's.
-fn pairs(baseline: &Group, group: &Group) -> Vec<(usize, usize)> {
-    let of = |group: &Group, i: usize| group.members[i.min(group.members.len() - 1)];
-    let seeds = baseline.members.len().max(group.members.len());
-    (0..seeds).map(|i| (of(baseline, i), of(group, i))).collect()
-}
-
-fn differences(
-    experiment: &Experiment,
-    sequences: &[SequenceResults],
-    pairs: &[(usize, usize)],
-) -> Vec<MetricDifference> {
+fn differences(experiment: &Experiment, over: &[SequenceResults], pair: Pair<'_>) -> Vec<MetricDifference> {
     let columns = experiment.columns.iter().filter(|column| column.metric.is_of_frames());
     let difference = |column: &Column| {
-        let of_frame = |sequence: &SequenceResults, (b, v): (usize, usize), frame: usize| {
-            let value = |variant: usize| sequence.variants[variant].frames[frame].value(column.metric);
-            Some(value(v)? - value(b)?)
-        };
-        let of_sequence = |sequence: &SequenceResults, pairs: &[(usize, usize)]| -> Vec<f64> {
-            let frames = 0..sequence.variants[pairs[0].0].frames.len();
-            let mean = |frame: usize| {
-                let each: Option<Vec<f64>> = pairs.iter().map(|&p| of_frame(sequence, p, frame)).collect();
-                each.map(|each| each.iter().sum::<f64>() / each.len() as f64)
-            };
-            frames.filter_map(mean).collect()
-        };
-        let over = |pairs: &[(usize, usize)]| -> Vec<Vec<f64>> {
-            sequences.iter().map(|sequence| of_sequence(sequence, pairs)).collect()
-        };
-        let better = column.metric.higher_is_better();
-        let of_seeds = pairs.iter().map(|pair| Some(paired(&over(std::slice::from_ref(pair)), better)?.mean));
-        let over_seeds = of_seeds.collect::<Option<Vec<f64>>>().and_then(|means| spread(&means));
+        let (estimate, judgement) = pair.judged(experiment, over, column.metric).unzip();
         MetricDifference {
             metric: column.metric,
             decimals: column.decimals(),
-            paired: paired(&over(pairs), better),
-            over_seeds,
+            estimate,
+            judgement,
+            over_seeds: pair.over_seeds(over, column.metric),
         }
     };
     columns.map(difference).collect()

@@ -1,8 +1,8 @@
 //! Variants compared frame by frame.
 
-use super::stats::Paired;
 use serde::{Deserialize, Serialize};
 use skinsplat_metrics::MetricId;
+use skinsplat_statistics::{Covers, Estimate, Interval, Judgement};
 use skinsplat_table::{Cell, Column, Digits, Label, Row, Table};
 
 /// Two variants compared frame by frame.
@@ -27,9 +27,11 @@ pub struct MetricDifference {
     pub metric: MetricId,
     /// Digits after the point.
     pub decimals: usize,
-    /// The difference; none if no frame was scored for both or one is infinite. With several seeds, frames are means over
-    /// them, each seed's variant compared with the same seed's baseline.
-    pub paired: Option<Paired>,
+    /// Variant minus baseline; none if no frame was scored for both or one is infinite. With several seeds, each seed's variant
+    /// is compared with the same seed's baseline.
+    pub estimate: Option<Estimate>,
+    /// What the estimate decides.
+    pub judgement: Option<Judgement>,
     /// Standard deviation of the mean difference over seeds; none from fewer than two.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub over_seeds: Option<f64>,
@@ -38,13 +40,27 @@ pub struct MetricDifference {
 impl Comparison {
     /// Frames behind the differences.
     fn frames(&self) -> usize {
-        self.differences.iter().filter_map(|d| d.paired).map(|p| p.frames).max().unwrap_or(0)
+        self.differences.iter().filter_map(|d| d.estimate).map(|e| e.frames).max().unwrap_or(0)
+    }
+
+    /// What the intervals speak of: `frames`, `frames and seeds`, `4 subjects`.
+    fn covers(&self) -> Cell {
+        let estimates = self.differences.iter().filter_map(|d| d.estimate);
+        let mut intervals = estimates.filter_map(|estimate| Some((estimate, estimate.interval?)));
+        match intervals.next() {
+            None => Cell::empty(),
+            Some((estimate, Interval { covers: Covers::Subjects, .. })) => {
+                Cell::text(format!("{} subjects", estimate.subjects))
+            }
+            Some((_, interval)) => Cell::text(interval.covers.words()),
+        }
     }
 
     fn row(&self, index: usize) -> Row {
         let sequence = self.sequence.clone().unwrap_or_else(|| "All".to_owned());
         let difference = format!("{} − {}", self.variant, self.baseline);
-        let cells = [Cell::count(self.frames())].into_iter().chain(self.differences.iter().map(cell));
+        let cells =
+            [Cell::count(self.frames()), self.covers()].into_iter().chain(self.differences.iter().map(cell));
         Row::new(index.to_string(), [sequence, difference], cells.collect())
     }
 }
@@ -55,7 +71,7 @@ pub(super) fn table(comparisons: &[Comparison]) -> Table {
     let column = |d: &MetricDifference| Column::new(d.metric.id(), format!("Δ {}", d.metric.title()));
     Table {
         labels: vec![Label::new("sequence", "Sequence"), Label::new("difference", "Difference")],
-        columns: [Column::new("frames", "Frames")]
+        columns: [Column::new("frames", "Frames"), Column::text("covers", "Interval covers")]
             .into_iter()
             .chain(differences.iter().map(column))
             .collect(),
@@ -64,20 +80,22 @@ pub(super) fn table(comparisons: &[Comparison]) -> Table {
     }
 }
 
-/// `+0.12 ± 0.03 over seeds [+0.05, +0.20], won 83 %`.
+/// `+0.12 ± 0.03 over seeds [+0.05, +0.20], better, won 83 %`.
 fn cell(difference: &MetricDifference) -> Cell {
-    let Some(paired) = difference.paired else { return Cell::empty() };
+    let (Some(estimate), Some(judgement)) = (difference.estimate, difference.judgement) else {
+        return Cell::empty();
+    };
     // One digit more than the table: differences are smaller than what they are differences of.
     let digits = Digits::Decimals(difference.decimals + 1);
     let signed = |value: f64| Cell::difference(value, digits).text;
-    let interval = match paired.interval {
-        Some([low, high]) => format!(" [{}, {}]", signed(low), signed(high)),
+    let interval = match estimate.interval {
+        Some(Interval { low, high, .. }) => format!(" [{}, {}]", signed(low), signed(high)),
         None => String::new(),
     };
     let spread = match difference.over_seeds {
         Some(sd) => format!(" ± {} over seeds", digits.show(sd)),
         None => String::new(),
     };
-    let won = 100.0 * paired.win_rate;
-    Cell::phrase(paired.mean, format!("{}{spread}{interval}, won {won:.0} %", signed(paired.mean)))
+    let (mean, words, won) = (signed(estimate.mean), judgement.words(), 100.0 * estimate.win_rate);
+    Cell::phrase(estimate.mean, format!("{mean}{spread}{interval}, {words}, won {won:.0} %"))
 }

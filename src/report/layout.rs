@@ -2,7 +2,7 @@
 //! sequence.
 
 use crate::experiment::{self, Layout};
-use skinsplat_table::{Cell, Column, Digits, Direction, Label, Row, RowKind, mark_best};
+use skinsplat_table::{Cell, Column, Digits, Direction, Label, Row, RowKind};
 
 /// The numbers of one sequence (or of the mean) and one variant.
 pub(super) struct Entry {
@@ -29,27 +29,6 @@ pub(super) struct Shape {
     pub(super) rows: Vec<Row>,
 }
 
-/// Marks the best measured value of each sequence (and of the mean) in every column.
-pub(super) fn mark_best_per_sequence(entries: &mut [Entry], columns: &[experiment::Column]) {
-    let measured = |entry: &Entry| matches!(entry.kind, RowKind::Measured | RowKind::Mean);
-    let mut groups: Vec<(RowKind, String)> = Vec::new();
-    for entry in entries.iter().filter(|entry| measured(entry)) {
-        let group = (entry.kind, entry.sequence.clone());
-        if !groups.contains(&group) {
-            groups.push(group);
-        }
-    }
-    let directions: Vec<Option<Direction>> = columns.iter().map(|column| Some(direction(column))).collect();
-    for (kind, sequence) in groups {
-        let mut rows: Vec<&mut Vec<Cell>> = entries
-            .iter_mut()
-            .filter(|entry| entry.kind == kind && entry.sequence == sequence)
-            .map(|entry| &mut entry.cells)
-            .collect();
-        mark_best(&mut rows, &directions);
-    }
-}
-
 /// Brings entries into shape.
 pub(super) fn shape(layout: Layout, columns: &[experiment::Column], entries: Vec<Entry>) -> Shape {
     match layout {
@@ -58,7 +37,8 @@ pub(super) fn shape(layout: Layout, columns: &[experiment::Column], entries: Vec
     }
 }
 
-fn direction(column: &experiment::Column) -> Direction {
+/// Which values of a column are better.
+pub(super) fn direction(column: &experiment::Column) -> Direction {
     Direction::higher_if(column.metric.higher_is_better())
 }
 

@@ -8,8 +8,8 @@ use skinsplat_table::markdown as write;
 pub fn markdown(results: &TableResults) -> String {
     let mut text = write::markdown(&results.table);
     if !results.comparisons.is_empty() {
-        text += "\nFrame by frame: mean difference, its 95 % interval (paired block bootstrap, seeded), and the share of \
-                 frames won.\n\n";
+        text += "\nFrame by frame: mean difference, its 95 % interval over what the column names, what that decides, and the \
+                 share of frames won.\n\n";
         text += &write::grid(&comparison::table(&results.comparisons));
     }
     if let Some(paper) = &results.paper {

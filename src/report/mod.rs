@@ -8,21 +8,22 @@
 //! ```
 //!
 //! A [`Table`](skinsplat_table::Table) is the one value that every format prints. Missing frames are counted and named, a metric that was not
-//! computed is "n/c" and never 0, and the best value of a sequence is judged on the printed digits.
+//! computed is "n/c" and never 0, and bold is the best value of a sequence with everything that is not decided to be worse.
 
+mod best;
 mod build;
 mod captions;
 mod collect;
 pub mod compare;
 mod comparison;
 mod curves;
+mod differences;
 mod layout;
 mod markdown;
 mod page;
 mod paper;
 mod replicates;
 mod results;
-pub mod stats;
 
 pub use collect::results;
 pub use comparison::{Comparison, MetricDifference};

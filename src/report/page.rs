@@ -9,8 +9,9 @@ use std::collections::BTreeSet;
 pub fn page(results: &Results) -> String {
     let mut text = format!(
         "# Results\n\nMade by `{}`, on the data that the tables name (experiment files and a data folder are further \
-         arguments). Nothing on this page depends on the time or the machine. The best value of a sequence \
-         is bold, judged on the printed digits; equal digits are equally good. ↑: more is better, ↓: less is better; \
+         arguments). Nothing on this page depends on the time or the machine. Bold is the best value of a \
+         sequence, with everything that the frames do not decide to be worse: where they are too few to decide anything, all of \
+         it. Counts are bold only where they are what the table is about. ↑: more is better, ↓: less is better; \
          n/c: not computed.\n\n",
         command(results)
     );

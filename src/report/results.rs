@@ -8,7 +8,7 @@ use skinsplat_metrics::{FrameScore, MetricId, ProtocolId, Summary};
 use skinsplat_table::{Digits, Table, to_json};
 
 /// Version of the document's format.
-pub const SCHEMA: u32 = 2;
+pub const SCHEMA: u32 = 3;
 
 /// Everything that a run found out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

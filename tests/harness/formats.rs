@@ -25,28 +25,28 @@ fn a_table_of_rows() {
 
     | Sequence | Variant | PSNR ↑ | SSIM ↑ | LPIPS\* ↓ | Splats ↓ |
     | :-- | :-- | --: | --: | --: | --: |
-    | anna | Matrices | 20.25 | 0.920 | 0.1797 | **100** |
+    | anna | Matrices | **20.25** | **0.920** | **0.1797** | 100 |
     |  | Matrices, paper | 20.10 | 0.920 | 0.1800 | 90 |
     |  | Matrices − paper | +0.15 | 0.000 | −0.0003 | +10 |
-    |  | Quaternions | **20.75** | **0.921** | **0.1793** | **100** |
-    | bob | Matrices | 21.25 | 0.921 | 0.1787 | **100** |
+    |  | Quaternions | **20.75** | **0.921** | **0.1793** | 100 |
+    | bob | Matrices | **21.25** | **0.921** | **0.1787** | 100 |
     |  | Matrices, paper | **21.00** | 0.820 <sup>1</sup> | 0.1600 | 90 |
     |  | Matrices − paper | +0.25 | +0.101 | +0.0187 | +10 |
-    |  | Quaternions | **21.75** | **0.922** | **0.1783** | **100** |
-    | Mean | Matrices | 20.75 | **0.921** | 0.1792 | **100** |
-    |  | Quaternions | **21.25** | **0.921** | **0.1788** | **100** |
+    |  | Quaternions | **21.75** | **0.922** | **0.1783** | 100 |
+    | Mean | Matrices | 20.75 | 0.921 | 0.1792 | 100 |
+    |  | Quaternions | **21.25** | **0.921** | **0.1788** | 100 |
 
     <sup>1</sup> bob, Matrices: ssim 0.820 looks like a slip
 
     A made-up table.
 
-    Frame by frame: mean difference, its 95 % interval (paired block bootstrap, seeded), and the share of frames won.
+    Frame by frame: mean difference, its 95 % interval over what the column names, what that decides, and the share of frames won.
 
-    | Sequence | Difference | Frames | Δ PSNR | Δ SSIM | Δ LPIPS |
-    | :-- | :-- | --: | --: | --: | --: |
-    | anna | Quaternions − Matrices | 6 | +0.500 [+0.500, +0.500], won 100 % | +0.0005 [+0.0005, +0.0005], won 100 % | −0.00050 [−0.00050, −0.00050], won 100 % |
-    | bob | Quaternions − Matrices | 6 | +0.500 [+0.500, +0.500], won 100 % | +0.0005 [+0.0005, +0.0005], won 100 % | −0.00050 [−0.00050, −0.00050], won 100 % |
-    | All | Quaternions − Matrices | 12 | +0.500 [+0.500, +0.500], won 100 % | +0.0005 [+0.0005, +0.0005], won 100 % | −0.00050 [−0.00050, −0.00050], won 100 % |
+    | Sequence | Difference | Frames | Interval covers | Δ PSNR | Δ SSIM | Δ LPIPS |
+    | :-- | :-- | --: | :-- | --: | --: | --: |
+    | anna | Quaternions − Matrices | 6 | — | +0.500, too few frames, won 100 % | +0.0005, too few frames, won 100 % | −0.00050, too few frames, won 100 % |
+    | bob | Quaternions − Matrices | 6 | — | +0.500, too few frames, won 100 % | +0.0005, too few frames, won 100 % | −0.00050, too few frames, won 100 % |
+    | All | Quaternions − Matrices | 12 | 2 subjects | +0.500 [+0.500, +0.500], better, won 100 % | +0.0005 [+0.0005, +0.0005], better, won 100 % | −0.00050 [−0.00050, −0.00050], better, won 100 % |
 
     <details>
     <summary>Table 7 of a paper, as printed: the paper's values on its data and avatars (not comparable with a stand-in's)</summary>
@@ -86,18 +86,18 @@ fn a_table_of_rows() {
     \toprule
     Sequence & Variant & PSNR $\uparrow$ & SSIM $\uparrow$ & LPIPS* $\downarrow$ & Splats $\downarrow$ \\
     \midrule
-    anna & Matrices & 20.25 & 0.920 & 0.1797 & \textbf{100} \\
+    anna & Matrices & \textbf{20.25} & \textbf{0.920} & \textbf{0.1797} & 100 \\
      & Matrices, paper & 20.10 & 0.920 & 0.1800 & 90 \\
      & Matrices $-$ paper & +0.15 & 0.000 & $-$0.0003 & +10 \\
-     & Quaternions & \textbf{20.75} & \textbf{0.921} & \textbf{0.1793} & \textbf{100} \\
+     & Quaternions & \textbf{20.75} & \textbf{0.921} & \textbf{0.1793} & 100 \\
     \midrule
-    bob & Matrices & 21.25 & 0.921 & 0.1787 & \textbf{100} \\
+    bob & Matrices & \textbf{21.25} & \textbf{0.921} & \textbf{0.1787} & 100 \\
      & Matrices, paper & \textbf{21.00} & 0.820$^{1}$ & 0.1600 & 90 \\
      & Matrices $-$ paper & +0.25 & +0.101 & +0.0187 & +10 \\
-     & Quaternions & \textbf{21.75} & \textbf{0.922} & \textbf{0.1783} & \textbf{100} \\
+     & Quaternions & \textbf{21.75} & \textbf{0.922} & \textbf{0.1783} & 100 \\
     \midrule
-    Mean & Matrices & 20.75 & \textbf{0.921} & 0.1792 & \textbf{100} \\
-     & Quaternions & \textbf{21.25} & \textbf{0.921} & \textbf{0.1788} & \textbf{100} \\
+    Mean & Matrices & 20.75 & 0.921 & 0.1792 & 100 \\
+     & Quaternions & \textbf{21.25} & \textbf{0.921} & \textbf{0.1788} & 100 \\
     \bottomrule
     \end{tabular}
     \\ {\footnotesize $^{1}$ bob, Matrices: ssim 0.820 looks like a slip}
@@ -120,10 +120,10 @@ fn a_wide_table() {
 
     | Method | anna PSNR ↑ | anna SSIM ↑ | anna LPIPS\* ↓ | anna Splats ↓ | bob PSNR ↑ | bob SSIM ↑ | bob LPIPS\* ↓ | bob Splats ↓ | All PSNR ↑ | All SSIM ↑ | All LPIPS\* ↓ | All Splats ↓ |
     | :-- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |
-    | Matrices | 20.25 | 0.920 | 0.1797 | **100** | 21.25 | 0.921 | 0.1787 | **100** | 20.75 | **0.921** | 0.1792 | **100** |
+    | Matrices | **20.25** | **0.920** | **0.1797** | 100 | **21.25** | **0.921** | **0.1787** | 100 | 20.75 | 0.921 | 0.1792 | 100 |
     | Matrices, paper | 20.10 | 0.920 | 0.1800 | 90 | **21.00** | 0.820 <sup>1</sup> | 0.1600 | 90 | — | — | — | — |
     | Matrices − paper | +0.15 | 0.000 | −0.0003 | +10 | +0.25 | +0.101 | +0.0187 | +10 | — | — | — | — |
-    | Quaternions | **20.75** | **0.921** | **0.1793** | **100** | **21.75** | **0.922** | **0.1783** | **100** | **21.25** | **0.921** | **0.1788** | **100** |
+    | Quaternions | **20.75** | **0.921** | **0.1793** | 100 | **21.75** | **0.922** | **0.1783** | 100 | **21.25** | **0.921** | **0.1788** | 100 |
 
     <sup>1</sup> bob, Matrices: ssim 0.820 looks like a slip
 
@@ -149,10 +149,10 @@ fn a_wide_table() {
     \cmidrule(lr){10-13}
     Method & PSNR $\uparrow$ & SSIM $\uparrow$ & LPIPS* $\downarrow$ & Splats $\downarrow$ & PSNR $\uparrow$ & SSIM $\uparrow$ & LPIPS* $\downarrow$ & Splats $\downarrow$ & PSNR $\uparrow$ & SSIM $\uparrow$ & LPIPS* $\downarrow$ & Splats $\downarrow$ \\
     \midrule
-    Matrices & 20.25 & 0.920 & 0.1797 & \textbf{100} & 21.25 & 0.921 & 0.1787 & \textbf{100} & 20.75 & \textbf{0.921} & 0.1792 & \textbf{100} \\
+    Matrices & \textbf{20.25} & \textbf{0.920} & \textbf{0.1797} & 100 & \textbf{21.25} & \textbf{0.921} & \textbf{0.1787} & 100 & 20.75 & 0.921 & 0.1792 & 100 \\
     Matrices, paper & 20.10 & 0.920 & 0.1800 & 90 & \textbf{21.00} & 0.820$^{1}$ & 0.1600 & 90 & --- & --- & --- & --- \\
     Matrices $-$ paper & +0.15 & 0.000 & $-$0.0003 & +10 & +0.25 & +0.101 & +0.0187 & +10 & --- & --- & --- & --- \\
-    Quaternions & \textbf{20.75} & \textbf{0.921} & \textbf{0.1793} & \textbf{100} & \textbf{21.75} & \textbf{0.922} & \textbf{0.1783} & \textbf{100} & \textbf{21.25} & \textbf{0.921} & \textbf{0.1788} & \textbf{100} \\
+    Quaternions & \textbf{20.75} & \textbf{0.921} & \textbf{0.1793} & 100 & \textbf{21.75} & \textbf{0.922} & \textbf{0.1783} & 100 & \textbf{21.25} & \textbf{0.921} & \textbf{0.1788} & 100 \\
     \bottomrule
     \end{tabular}
     \\ {\footnotesize $^{1}$ bob, Matrices: ssim 0.820 looks like a slip}
@@ -179,10 +179,10 @@ fn holes_are_shown_not_averaged_away() {
     |  | Matrices, paper | 20.10 | 0.920 | 0.1800 | 90 |
     |  | Matrices − paper | +0.20 | 0.000 | −0.0003 | +10 |
     |  | Quaternions | 20.75 | 0.921 | 0.1793 | 100 |
-    | bob | Matrices | 21.00 | 0.500 | n/c <sup>2</sup> | **100** |
+    | bob | Matrices | 21.00 | **0.500** | n/c <sup>2</sup> | 100 |
     |  | Matrices, paper | **21.00** | 0.820 <sup>3</sup> | 0.1600 | 90 |
     |  | Matrices − paper | 0.00 | −0.320 | — | +10 |
-    |  | Quaternions | **∞** | **0.935** | 0.1485 | **100** |
+    |  | Quaternions | **∞** | **0.935** | 0.1485 | 100 |
     | Mean | Matrices | 20.65 <sup>4</sup> | 0.710 <sup>4</sup> | n/c <sup>4,2</sup> | 100 <sup>4</sup> |
     |  | Quaternions | ∞ | 0.928 | 0.1639 | 100 |
 

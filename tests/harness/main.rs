@@ -11,3 +11,4 @@ mod metrics;
 mod plans;
 mod reports;
 mod stores;
+mod verdicts;

@@ -91,8 +91,8 @@ fn results_read_back_and_other_versions_are_refused() {
     assert_eq!(again, results);
     assert_eq!(again.to_json(), text);
     assert_eq!(report::page(&again), report::page(&results));
-    let error = Results::from_json(&text.replacen("\"schema\": 2", "\"schema\": 9", 1)).unwrap_err();
-    assert_eq!(error, "schema: 9; expected 2, which this program reads");
+    let error = Results::from_json(&text.replacen("\"schema\": 3", "\"schema\": 9", 1)).unwrap_err();
+    assert_eq!(error, "schema: 9; expected 3, which this program reads");
     assert!(Results::from_json("{}").unwrap_err().contains("missing field `schema`"));
     let damaged: [Damage; 7] = [
         (|t| t.table.rows[1].cells[0].notes.push(99), "table `table7`: rows[1]: note 99; expected below 4"),
@@ -252,7 +252,7 @@ fn seeds_are_one_row_with_a_spread() {
     let comparison = table.comparisons.last().unwrap();
     let psnr = &comparison.differences[0];
     assert_eq!((comparison.variant.as_str(), comparison.baseline.as_str()), ("Quaternions", "Matrices"));
-    assert_eq!(psnr.paired.unwrap().mean, 2.0);
+    assert_eq!(psnr.estimate.unwrap().mean, 2.0);
     assert!((psnr.over_seeds.unwrap() - 2.0_f64.sqrt()).abs() < 1e-12);
     let markdown = report::markdown(&table);
     assert!(markdown.contains("+2.000 ± 1.414 over seeds"), "{markdown}");

@@ -57,7 +57,7 @@ pub struct Cell {
     pub spread: Option<f64>,
     /// As printed, before any markup: the rounded number (and `± spread`), `∞`, `n/c` (not computed), `—`, or the text.
     pub text: String,
-    /// Whether it is the best among rows that compare with it, judged on the printed digits.
+    /// Whether it is bold: the best among rows that compare with it, or as good.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub best: bool,
     /// How many should be in the sample behind the number and are not.
