@@ -11,6 +11,8 @@ use skinsplat_core::scene::body::vertex_normals;
 pub(super) struct Disc {
     pub(super) centre: DVec3,
     pub(super) normal: DVec3,
+    /// Of the part of the surface that it stands for, square metres.
+    pub(super) area: f64,
     /// Second moment of the part of the surface that it stands for, about the centre, square metres.
     pub(super) moment: DMat3,
 }
@@ -37,6 +39,37 @@ impl Disc {
     }
 }
 
+/// Every one of `n` draws from the discs, evenly by area: their indices and the discs they become, each as large as its share of
+/// the whole. Discs follow a curve through space that leaves no region early, so that neighbours share their areas.
+pub(super) fn sampled(discs: &[Disc], n: usize) -> Vec<(usize, Disc)> {
+    let mut order: Vec<usize> = (0..discs.len()).collect();
+    let (low, high) = discs.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), disc| {
+        (low.min(disc.centre), high.max(disc.centre))
+    });
+    let cells = (high - low).max_element().max(f64::MIN_POSITIVE);
+    order.sort_by_key(|&i| (interleaved((discs[i].centre - low) / cells), i));
+    let share = discs.iter().map(|disc| disc.area).sum::<f64>() / n as f64;
+    let (mut drawn, mut below) = (Vec::with_capacity(n), 0.0);
+    for i in order {
+        below += discs[i].area;
+        if drawn.len() < n && below > share * (drawn.len() as f64 + 0.5) {
+            let Disc { centre, normal, .. } = discs[i];
+            let across = DMat3::IDENTITY - outer(normal, normal);
+            let moment = across * (share / (4.0 * std::f64::consts::PI));
+            drawn.push((i, Disc { centre, normal, area: share, moment }));
+        }
+    }
+    drawn
+}
+
+/// The bits of three coordinates in \[0, 1\] in turns (Morton's order).
+fn interleaved(at: DVec3) -> u64 {
+    let cells = (at * 1023.0).clamp(DVec3::ZERO, DVec3::splat(1023.0)).to_array().map(|c| c as u64);
+    (0..10).fold(0, |code, bit| {
+        cells.iter().enumerate().fold(code, |code, (axis, cell)| code | (cell >> bit & 1) << (3 * bit + axis))
+    })
+}
+
 /// One disc per vertex: its part is the surface weighted by the vertex's hat function (one at the vertex, linear, zero on
 /// the far edges), so that the parts of all vertices together weigh every point of the surface by one.
 pub(super) fn of_vertices(vertices: &[DVec3], faces: &[[u32; 3]]) -> Vec<Disc> {
@@ -57,6 +90,7 @@ pub(super) fn of_vertices(vertices: &[DVec3], faces: &[[u32; 3]]) -> Vec<Disc> {
     let disc = |(i, (moment, weight)): (usize, (DMat3, f64))| Disc {
         centre: vertices[i],
         normal: normals[i],
+        area: weight,
         moment: if weight > 0.0 { moment * weight.recip() } else { DMat3::ZERO },
     };
     moments.into_iter().enumerate().map(disc).collect()
@@ -69,7 +103,9 @@ pub(super) fn of_faces(vertices: &[DVec3], faces: &[[u32; 3]]) -> Vec<Disc> {
         let centre = (a + b + c) / 3.0;
         let moment =
             [a, b, c].iter().map(|p| outer(*p - centre, *p - centre)).fold(DMat3::ZERO, |s, m| s + m);
-        Disc { centre, normal: (b - a).cross(c - a).normalize_or_zero(), moment: moment * (1.0 / 12.0) }
+        let normal = (b - a).cross(c - a);
+        let (area, moment) = (normal.length() / 2.0, moment * (1.0 / 12.0));
+        Disc { centre, normal: normal.normalize_or_zero(), area, moment }
     };
     faces.iter().map(disc).collect()
 }

@@ -38,7 +38,7 @@ mod tests {
 
     #[test]
     fn a_layer_below_limits_the_room_and_one_above_or_aside_does_not() {
-        let disc = |centre: DVec3, normal: DVec3| Disc { centre, normal, moment: DMat3::ZERO };
+        let disc = |centre: DVec3, normal: DVec3| Disc { centre, normal, area: 0.0, moment: DMat3::ZERO };
         let discs = [
             disc(DVec3::ZERO, DVec3::Z),
             disc(DVec3::new(0.001, 0.0, -0.004), -DVec3::Z),

@@ -9,8 +9,8 @@ use super::room::room_below;
 use super::sighting::{Frame, SurfacePoint};
 use super::tessellation::Tessellation;
 use super::{Error, clothing, tessellation, training};
-pub use crate::recipe::{BindTo, Placement};
-use glam::DVec3;
+pub use crate::recipe::{BindTo, Placement, StartShape};
+use glam::{DVec3, Vec3};
 use skinsplat_core::math::portable;
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::body::vertex_normals;
@@ -41,6 +41,12 @@ pub struct SurfaceInit {
     /// How far below the surface the Gaussians sit, in pixels of the training frames: a splat renderer widens every
     /// outline by its low-pass filter. Thin parts sink less; what no frame shows (inside the mouth) stays.
     pub inset: f64,
+    /// Gaussians drawn from the surface, evenly by area and as large as their share of it; none: all that `placement` has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub samples: Option<u32>,
+    /// What they look like.
+    #[serde(skip_serializing_if = "StartShape::is_disc")]
+    pub shape: StartShape,
     /// SH degree of the colours, 0 to 3.
     pub sh_degree: usize,
     /// Pull of degrees 1 to 3 towards zero, relative to the observations.
@@ -66,6 +72,8 @@ impl Default for SurfaceInit {
             thickness: 0.1,
             opacity: 0.99,
             inset: 1.2,
+            samples: None,
+            shape: StartShape::Disc,
             sh_degree: 0,
             smoothness: 0.1,
             refinements: 1,
@@ -86,6 +94,12 @@ pub fn surface_init(sequence: &Sequence, init: &SurfaceInit) -> Result<Avatar, E
     let dressed = clothing::dressed(&training, &init.clothing, &init.sighting)?;
     let (layout, mut colours) = coloured(&dressed, init)?;
     refine(&dressed, &layout, init, &mut colours)?;
+    let (layout, colours) = match init.samples {
+        Some(n) => layout
+            .sampled(&colours, n as usize, sequence.body.skeleton.num_joints())
+            .map_err(Error::scene(sequence))?,
+        None => (layout, colours),
+    };
     Ok(layout.avatar(init, &colours, &sequence.body))
 }
 
@@ -245,6 +259,31 @@ impl Layout {
         Ok(Self { discs, sites, parts, neighbours, pixel: pixel_on_surface(sequence)? })
     }
 
+    /// Some of the Gaussians, standing for all, with their colours. Of no more than there are.
+    fn sampled(self, colours: &Colours, n: usize, joints: usize) -> Result<(Self, Colours), SceneError> {
+        let (kept, discs): (Vec<usize>, Vec<Disc>) =
+            disc::sampled(&self.discs, n.min(self.discs.len())).into_iter().unzip();
+        let stride = sh::count(colours.degree);
+        let own = |&i: &usize| colours.coefficients[i * stride..][..stride].iter().copied();
+        let colours = Colours {
+            degree: colours.degree,
+            coefficients: kept.iter().flat_map(own).collect(),
+            confidence: kept.iter().map(|&i| colours.confidence[i]).collect(),
+        };
+        let sites = kept.iter().map(|&i| self.sites[i]).collect();
+        let skin = match &self.parts.skin {
+            Some(skin) => {
+                let row = |&i: &usize| {
+                    let (joints, weights) = skin.row(i);
+                    joints.iter().map(|&j| usize::from(j)).zip(weights.iter().copied()).collect::<Vec<_>>()
+                };
+                Some(SkinWeights::from_rows(kept.iter().map(row), joints)?)
+            }
+            None => None,
+        };
+        Ok((Self { discs, sites, parts: Parts { skin, ..self.parts }, ..self }, colours))
+    }
+
     /// How far each Gaussian sits below its disc, metres.
     fn insets(&self, init: &SurfaceInit, colours: &Colours) -> Vec<f64> {
         let (wanted, share) = (init.inset * self.pixel, init.cover.share_of_room);
@@ -257,8 +296,11 @@ impl Layout {
 
     /// The avatar, bound to a body whose surface may lie below the one on which the Gaussians sit.
     fn avatar(&self, init: &SurfaceInit, colours: &Colours, body: &RestBody) -> Avatar {
-        let shapes: Vec<_> =
-            self.discs.iter().map(|d| d.gaussian(init.scale, init.thickness, &init.cover)).collect();
+        let shapes: Vec<_> = self
+            .discs
+            .iter()
+            .map(|d| shaped(d.gaussian(init.scale, init.thickness, &init.cover), init.shape))
+            .collect();
         let means: Vec<DVec3> = self
             .discs
             .iter()
@@ -283,6 +325,14 @@ impl Layout {
             sh: colours.coefficients.clone(),
         };
         Avatar { gaussians, binding }
+    }
+}
+
+/// A disc, or the ball as wide as it is.
+fn shaped(disc: ([f32; 4], Vec3), shape: StartShape) -> ([f32; 4], Vec3) {
+    match shape {
+        StartShape::Disc => disc,
+        StartShape::Ball => ([1.0, 0.0, 0.0, 0.0], Vec3::splat(0.5 * (disc.1.x + disc.1.y))),
     }
 }
 

@@ -131,6 +131,8 @@ impl Starting {
             thickness: start.thickness,
             opacity: start.opacity,
             inset: start.inset,
+            samples: start.samples,
+            shape: start.shape,
             sh_degree: 0,
             refinements: 0,
             clothing: clothing.clone(),
