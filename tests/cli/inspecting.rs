@@ -31,7 +31,16 @@ fn every_layout_is_recognised() {
     has(&text, &["layout neuman", "sparse/images.txt", "sam_segmentations", "smpl_optimized"]);
     has(&text, &["8 files: images/", "not read", "at least 10, or splits"]);
     let text = said(&Desk::new(), "peoplesnapshot", "ava", smpl);
-    has(&text, &["layout peoplesnapshot:", "masks/*.{npy,png}", "anim_nerf_test.npz", "24 joints", "6 frames of 64x64, 6 masks"]);
+    has(
+        &text,
+        &[
+            "layout peoplesnapshot:",
+            "masks/*.{npy,png}",
+            "anim_nerf_test.npz",
+            "24 joints",
+            "6 frames of 64x64, 6 masks",
+        ],
+    );
     let text = said(&Desk::new(), "peoplesnapshot-raw", "someone", None);
     has(&text, &["layout peoplesnapshot-raw", "masks.hdf5", "camera.pkl", "consensus.pkl", "not read"]);
     let text = said(&Desk::new(), "xhumans", "00099", None);
