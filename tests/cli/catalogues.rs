@@ -157,3 +157,12 @@ fn a_plan_and_its_keys_do_not_depend_on_the_c_library() {
     };
     assert!(plan(None) == plan(Some(OTHER_KERNELS)), "the keys differ");
 }
+
+#[test]
+fn help_with_fetching_lists_the_files_and_an_entry_without_empty_tables() {
+    let text = Desk::new().ok(args!["fetch-help", "neuman"]);
+    for part in ["sparse/images.txt", "4d_humans/sam_segmentations", "reproduce inspect", "id = \"neuman\""] {
+        assert!(text.contains(part), "no `{part}` in {text}");
+    }
+    assert!(!text.contains("[dataset.splits]") && !text.contains("avatars = []"), "{text}");
+}

@@ -100,7 +100,9 @@ mod tests {
         let old = std::time::SystemTime::now() - 2 * ABANDONED;
         for (name, age) in [(".writing-a", Some(old)), (".writing-b", None), ("kept", Some(old))] {
             let file = File::create(folder.path().join(name)).unwrap();
-            age.map(|age| file.set_modified(age).unwrap());
+            if let Some(age) = age {
+                file.set_modified(age).unwrap();
+            }
         }
         sweep(folder.path());
         sweep(&folder.path().join("missing"));

@@ -1,13 +1,10 @@
 //! Skinned glTF as others write it: what is wrong is named, what is unusual is read or named.
 
-use crate::gltf_builder::{Builder, F32, U8, U16, U32, arm, close, posed};
-use glam::{DQuat, Vec3};
+use crate::files;
+use crate::gltf_builder::{Builder, F32, U8, arm};
 use serde_json::{Value, json};
-use skinsplat_core::scene::{Pose, PosedBody};
-use skinsplat_data::gltf::{self, Rig};
-use skinsplat_data::{body, poses};
-use std::f64::consts::FRAC_PI_2;
-use std::path::Path;
+use skinsplat_data::body;
+use skinsplat_data::gltf::Rig;
 
 #[test]
 fn what_is_wrong_with_a_rig_is_named() {

@@ -1,13 +1,12 @@
 //! Skinned glTF: containers, component types, several sets and primitives, animations.
 
-use crate::gltf_builder::{Builder, F32, U8, U16, U32, arm, close, posed};
-use glam::{DQuat, Vec3};
-use serde_json::{Value, json};
-use skinsplat_core::scene::{Pose, PosedBody};
+use crate::gltf_builder::{U8, U16, U32, arm, close, posed};
+use glam::DQuat;
+use serde_json::json;
+use skinsplat_core::scene::Pose;
 use skinsplat_data::gltf::{self, Rig};
 use skinsplat_data::{body, poses};
 use std::f64::consts::FRAC_PI_2;
-use std::path::Path;
 
 #[test]
 fn joints_come_first_and_ancestors_carry_them() {
