@@ -63,7 +63,7 @@ fn inspect_refuses_what_it_does_not_know() {
         ("other.json", vec!["other.json"]),
         ("broken.json", vec!["broken.json", "line 1"]),
         ("frames.jsonl", vec!["frames.jsonl:1", "not a results store"]),
-        ("empty", vec!["empty", "datasets", "expected subjects"]),
+        ("empty", vec!["empty: folder: nothing that is known", "a folder of subjects", "neuman"]),
         ("nothing.ply", vec!["nothing.ply", "No such file"]),
         ("nothing", vec!["nothing"]),
     ] {

@@ -33,7 +33,11 @@ pub(super) fn text(path: &Path) -> Result<String> {
     }
     let known: Vec<&str> = layouts::LAYOUTS.iter().map(|layout| layout.id).collect();
     let expected = "an avatar's export, a subject or a folder of subjects (layouts";
-    bail!("{}: nothing that is known; expected {expected} {}), or images", path.display(), known.join(", "))
+    bail!(
+        "{}: folder: nothing that is known; expected {expected} {}), or images",
+        path.display(),
+        known.join(", ")
+    )
 }
 
 /// A subject: what lies there, what is missing, and what is read of it.
