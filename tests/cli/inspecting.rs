@@ -38,7 +38,8 @@ fn every_layout_is_recognised() {
             "masks/*.{npy,png}",
             "anim_nerf_test.npz",
             "24 joints",
-            "6 frames of 64x64, 6 masks",
+            "6 frames, ",
+            "6 masks, images of 64x64",
         ],
     );
     let text = said(&Desk::new(), "peoplesnapshot-raw", "someone", None);

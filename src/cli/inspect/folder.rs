@@ -77,9 +77,9 @@ fn sequence_text(sequence: &Sequence) -> String {
         FrameSource::Generated { .. } => true,
     };
     let masks = sequence.frames.iter().filter(|frame| masked(&frame.source)).count();
-    let size = |camera: &Camera| format!(" of {}x{}", camera.width, camera.height);
+    let size = |camera: &Camera| format!(", images of {}x{}", camera.width, camera.height);
     let size = sequence.cameras.first().map_or(String::new(), size);
-    line(&sequence.id, format!("{frames} frames{size}, {masks} masks, {poses} poses, {cameras} cameras"))
+    line(&sequence.id, format!("{frames} frames, {poses} poses, {cameras} cameras, {masks} masks{size}"))
 }
 
 fn renders_text(RenderFolder { frames, size, said }: &RenderFolder) -> String {
