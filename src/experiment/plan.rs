@@ -191,7 +191,14 @@ impl Builder<'_> {
             .filter(used)
             .map(|d| (d.registered_id().to_owned(), d.title.clone()))
             .collect();
-        let data_notes = self.data_notes(&rows);
+        let mut data_notes = self.data_notes(&rows);
+        if source == Source::Own
+            && experiment.has_own_bodies()
+            && rows.iter().all(|row| row.dataset == experiment.dataset)
+        {
+            let note = "on the subjects' own body templates, where the table asks for others";
+            data_notes.push(format!("{}: {note}", experiment.dataset));
+        }
         Ok(PlannedTable {
             data_notes,
             remarks: Vec::new(),

@@ -43,7 +43,9 @@ pub(super) fn rows_of(
     datasets: &[Dataset],
     options: &Options,
 ) -> (Source, Vec<DataRow>) {
-    let own = datasets.iter().find(|dataset| dataset.id == experiment.data_id());
+    // Who loads data without asking for the table's bodies has the subjects' own.
+    let named = |id: &str| datasets.iter().find(|dataset| dataset.id == id);
+    let own = named(&experiment.data_id()).or_else(|| named(&experiment.dataset));
     let stand_in = match (own, &experiment.stand_in) {
         // Where nothing of it can be used, a stand-in is of more use than rows of reasons.
         (Some(own), stand_in) if stand_in.is_none() || !own.subjects.is_empty() => {
