@@ -123,8 +123,50 @@ fn every_damage_is_found_by_its_kind() {
         let moved = |c: &Camera| Camera { cx: c.cx + shift, ..c.clone() };
         assert_eq!(kinds(&with_cameras(&sequence, moved)), [Kind::Camera], "principal point {shift}");
     }
+    let far = |c: &Camera| Camera { cx: 0.95 * f64::from(c.width), ..c.clone() };
+    assert!(kinds(&with_cameras(&sequence, far)).contains(&Kind::Camera), "principal point at the edge");
     let away = |pose: &Pose| Pose { translation: pose.translation + DVec3::X * 50.0, ..pose.clone() };
     let poses: Vec<Pose> = sequence.poses.iter().map(away).collect();
     let gone = Sequence { poses: poses.into(), ..sequence.clone() };
     assert_eq!(kinds(&gone), [Kind::BodyOutOfView]);
+}
+
+/// A mask as a lens shows it: what a pinhole sees at distance r from the centre is at r (1 + k r^2 / R^2), R half the diagonal.
+fn distorted(mask: &Mask, k: f64) -> Mask {
+    let (width, height) = (mask.width() as f64, mask.height() as f64);
+    let corner = 0.25 * (width * width + height * height);
+    let mut values = Vec::with_capacity(mask.width() * mask.height());
+    for y in 0..mask.height() {
+        for x in 0..mask.width() {
+            let at = glam::DVec2::new(x as f64 + 0.5 - 0.5 * width, y as f64 + 0.5 - 0.5 * height);
+            // Fixed point of p = at / (1 + k p^2 / R^2).
+            let undone = (0..20).fold(at, |p, _| at / (1.0 + k * p.length_squared() / corner));
+            let (u, v) = (undone.x + 0.5 * width, undone.y + 0.5 * height);
+            let inside = (0.0..width).contains(&u) && (0.0..height).contains(&v);
+            values.push(if inside { mask.at(u as usize, v as usize) } else { 0.0 });
+        }
+    }
+    Mask::new(mask.width(), mask.height(), values).unwrap()
+}
+
+#[test]
+fn a_lens_is_told_from_a_size() {
+    let sequence = original("snapshot_ava");
+    for (k, words) in [(-0.14, "not undistorted"), (0.14, "undistorted twice")] {
+        let (_, findings) = checked(&with_masks(&sequence, |_, mask| distorted(mask, k)));
+        let found: Vec<_> = findings.iter().map(|finding| finding.kind).collect();
+        assert_eq!(found, [Kind::Camera], "{k}: {findings:?}");
+        assert!(findings[0].detail.contains(words), "{k}: {findings:?}");
+    }
+}
+
+#[test]
+fn a_shape_beyond_the_model_is_found() {
+    let folder = support::data("blender/datasets/snapshot_ava");
+    let mut subject = Subject::load(Path::new(&folder), &Options::default()).unwrap();
+    assert!(check::subject(&subject).is_empty(), "{:?}", subject.shapes);
+    subject.shapes[0].betas = subject.shapes[0].directions + 1;
+    let found = check::subject(&subject);
+    assert_eq!(found.iter().map(|f| f.kind).collect::<Vec<_>>(), [Kind::BetasSize]);
+    assert!(!found[0].spoils && found[0].detail.contains("directions"), "{found:?}");
 }

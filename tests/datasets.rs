@@ -142,7 +142,8 @@ fn a_sequence_may_keep_everything_in_its_json() {
             std::fs::remove_file(copied.join(entry).join(file)).unwrap();
         }
     }
-    let options = Options { model: Some(support::data("blender/models/anny_smpl24.npz")), clothing: false };
+    let options =
+        Options { model: Some(support::data("blender/models/anny_smpl24.npz")), ..Options::default() };
     let from_json = Subject::load(&copied, &options).unwrap();
     let original = Subject::load(&subject("snapshot_ava"), &Options::default()).unwrap();
     for (a, b) in from_json.sequences().zip(original.sequences()) {
@@ -154,7 +155,8 @@ fn a_sequence_may_keep_everything_in_its_json() {
 fn what_is_wrong_with_a_sequence_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let copied = folder.path().join("ava");
-    let options = Options { model: Some(support::data("blender/models/anny_smpl24.npz")), clothing: false };
+    let options =
+        Options { model: Some(support::data("blender/models/anny_smpl24.npz")), ..Options::default() };
     let sequence = copied.join("test_twist");
     let listing = sequence.join("transforms.json");
     let text = std::fs::read_to_string(subject("snapshot_ava").join("test_twist/transforms.json")).unwrap();

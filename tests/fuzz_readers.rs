@@ -348,7 +348,8 @@ fn transforms_json() {
     let sequence = folder.path().join("test_twist");
     std::fs::create_dir(&sequence).unwrap();
     files::npz(&folder.path().join("small.npz"), &files::small_body());
-    let options = Options { model: Some(folder.path().join("small.npz")), clothing: true };
+    let options =
+        Options { model: Some(folder.path().join("small.npz")), clothing: true, ..Options::default() };
     let bytes = std::fs::read(path).unwrap();
     let config =
         ProptestConfig { cases: 300 * effort(), failure_persistence: None, ..ProptestConfig::default() };

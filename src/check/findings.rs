@@ -1,6 +1,6 @@
 //! What overlaps of silhouettes tell about the data.
 
-use super::{Finding, Kind, Seen, Shadows};
+use super::{Finding, Kind, Seen, Shadows, lens};
 use glam::DVec2;
 use skinsplat_data::{FrameSource, Sequence, frames};
 use std::collections::BTreeMap;
@@ -27,6 +27,7 @@ pub(super) fn of(sequence: &Sequence, seen: &[Seen]) -> Vec<Finding> {
         "the camera does not see the body",
     ));
     found.extend(dim_masks(sequence, seen));
+    found.extend(far_principal_point(sequence, &usable));
     let both: Vec<(&Seen, &Shadows)> =
         usable.into_iter().filter(|(_, shadows)| shadows.mask.area > 0 && shadows.body.area > 0).collect();
     let plain = mean(both.iter().filter_map(|(_, s)| s.body.overlap(&s.mask)));
@@ -41,11 +42,12 @@ pub(super) fn of(sequence: &Sequence, seen: &[Seen]) -> Vec<Finding> {
     }
     let whole: Vec<Edges> = both.iter().filter_map(|(seen, shadows)| Edges::of(seen, shadows)).collect();
     let finding = moved(sequence, &whole).or_else(|| order(sequence, &both));
+    let finding = finding.or_else(|| lens::bent(sequence, &both));
     found.extend(finding.or_else(|| sized(sequence, &whole)));
     found
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let values: Vec<f64> = values.collect();
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
@@ -101,6 +103,30 @@ fn dim_masks(sequence: &Sequence, seen: &[Seen]) -> Option<Finding> {
     );
     let spoils = stored.largest != 1.0;
     Some(Finding { spoils, ..Finding::new(Kind::MaskRange, &sequence.id, detail) })
+}
+
+/// How far from the middle a principal point is not expected, as a share of the side.
+const OFF_CENTRE: f64 = 0.25;
+/// An overlap below which the body is somewhere else.
+const ELSEWHERE: f64 = 0.5;
+
+/// A principal point far from the middle of the image, of cameras under which body and masks do not meet. Pictures that were
+/// cut out of others have such points too: there they meet.
+fn far_principal_point(sequence: &Sequence, usable: &[(&Seen, &Shadows)]) -> Option<Finding> {
+    let off = |at: f64, side: u32| (at / f64::from(side) - 0.5).abs();
+    let far = |seen: &Seen| {
+        let camera = &seen.camera;
+        off(camera.cx, camera.width).max(off(camera.cy, camera.height)) > OFF_CENTRE
+    };
+    let far: Vec<&(&Seen, &Shadows)> = usable.iter().filter(|(seen, _)| far(seen)).collect();
+    let first = far.first()?;
+    let met = mean(far.iter().map(|(_, s)| s.body.overlap(&s.mask).unwrap_or(0.0)))?;
+    let camera = &sequence.cameras[sequence.frames[first.0.index].camera];
+    let detail = format!(
+        "principal point ({:.1}, {:.1}) of images of {}x{}, where body and masks overlap by {met:.2}",
+        camera.cx, camera.cy, camera.width, camera.height
+    );
+    (met < ELSEWHERE).then(|| Finding::new(Kind::Camera, &sequence.id, detail))
 }
 
 /// Frames that are compared with one another, at most.

@@ -4,6 +4,7 @@
 //! are shifted against frames, another body or camera. [`sequence`] measures the overlap and names what it finds.
 
 mod findings;
+mod lens;
 mod overlays;
 mod shadows;
 
@@ -13,7 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use shadows::Shadow;
 use skinsplat_core::scene::{Camera, Mask, PosedBody};
-use skinsplat_data::{Error, Sequence};
+use skinsplat_data::{Error, Sequence, ShapeFit, Subject};
 use skinsplat_render::mesh::{Mesh, SamplePattern, silhouette};
 
 /// Longer side at which silhouettes are compared, pixels.
@@ -131,6 +132,21 @@ struct Shadows {
 struct Problem {
     kind: Kind,
     text: String,
+}
+
+/// What a subject's own numbers say, before any frame is looked at: shapes that its body model cannot take. `sequence` of the
+/// findings is empty.
+pub fn subject(subject: &Subject) -> Vec<Finding> {
+    let cut = subject.shapes.iter().filter(|shape| shape.betas > shape.directions);
+    let finding = |shape: &ShapeFit| {
+        let ShapeFit { file, betas, directions } = shape;
+        let detail = format!(
+            "{}: {betas} shape coefficients for a model of {directions} directions: another model, or a shape that is not whole",
+            file.display()
+        );
+        Finding::new(Kind::BetasSize, "", detail)
+    };
+    cut.map(finding).collect()
 }
 
 /// Compares silhouettes and masks of some frames of a sequence, in their order, and names what is wrong.

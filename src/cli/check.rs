@@ -59,6 +59,8 @@ impl Check {
                 },
             };
             subject.notes.iter().for_each(|note| context.note(format!("{name}: {note}")));
+            let own = check::subject(&subject).into_iter();
+            seen.findings.extend(own.map(|f| Finding { sequence: name.clone(), ..f }));
             for sequence in subject.sequences() {
                 let all: Vec<usize> = (0..sequence.frames.len()).collect();
                 let frames = evenly_spaced(&all, self.limit.map(|limit| limit as usize));

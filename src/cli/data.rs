@@ -106,15 +106,21 @@ impl Data {
     }
 
     fn options(&self) -> Options {
-        Options { model: None, clothing: self.clothing }
+        Options { clothing: self.clothing, ..Options::default() }
     }
 
-    /// Loads the subjects of a data set, and which of its avatars the experiments name. A subject that cannot be loaded does
-    /// not keep the others from being used.
-    fn load(&self, dataset: &Dataset, experiments: &[Experiment]) -> Result<LoadedDataset> {
+    /// Loads the subjects of a data set, and which of its avatars the experiments name; on the bodies that one of them asks
+    /// for, if it is given. A subject that cannot be loaded does not keep the others from being used.
+    fn load(
+        &self,
+        dataset: &Dataset,
+        experiments: &[Experiment],
+        asking: Option<&Experiment>,
+    ) -> Result<LoadedDataset> {
         let (mut subjects, mut unreadable) = (Vec::new(), Vec::new());
         for id in dataset.subject_ids()? {
-            match dataset.load_one(&id, &self.options()) {
+            let gender = asking.and_then(|experiment| experiment.genders.get(&id)).copied();
+            match dataset.load_one(&id, &Options { gender, ..self.options() }) {
                 Ok(subject) => subjects.push(subject),
                 Err(error) => unreadable.push(Unreadable { subject: id, problem: error.to_string() }),
             }
@@ -125,20 +131,30 @@ impl Data {
         };
         let avatars = dataset.avatars.iter().filter(|avatar| named(&avatar.name));
         let avatars = avatars.map(|a| RegisteredAvatar { name: a.name.clone(), path: a.path.clone() });
-        let (id, title) = (dataset.id.clone(), dataset.title.clone());
+        let id = asking.map_or_else(|| dataset.id.clone(), Experiment::data_id);
+        let title = dataset.title.clone();
         let splits_given = dataset.subject_ids()?.into_iter().filter(|id| dataset.has_split(id)).collect();
         Ok(LoadedDataset { id, title, subjects, avatars: avatars.collect(), splits_given, unreadable })
     }
 
     /// Loads what the experiments can use: their own datasets, and those that may stand in.
     pub(super) fn library(&self, experiments: &[Experiment]) -> Result<Library> {
-        let own = |id: &str| experiments.iter().any(|experiment| experiment.dataset == id);
+        let own = |id: &str| experiments.iter().any(|experiment| experiment.data_id() == id);
         let stands_in = experiments.iter().any(|experiment| experiment.stand_in.is_some());
         let named = |d: &Dataset| own(&d.id) && d.is_begun();
-        let wanted = |d: &&Dataset| named(d) || (stands_in && d.stand_in && d.is_available());
+        let wanted = |d: &Dataset| named(d) || (stands_in && d.stand_in && d.is_available());
         let registry = self.registry()?;
-        let loaded = registry.datasets.iter().filter(wanted).map(|dataset| self.load(dataset, experiments));
-        let loaded: Vec<LoadedDataset> = loaded.collect::<Result<_>>()?;
+        let mut loaded: Vec<LoadedDataset> = Vec::new();
+        for dataset in &registry.datasets {
+            if wanted(dataset) {
+                loaded.push(self.load(dataset, experiments, None)?);
+            }
+            let asking =
+                |e: &&Experiment| e.has_own_bodies() && e.dataset == dataset.id && dataset.is_begun();
+            for experiment in experiments.iter().filter(asking) {
+                loaded.push(self.load(dataset, experiments, Some(experiment))?);
+            }
+        }
         let mut broken = loaded.iter().flat_map(|dataset| &dataset.unreadable);
         if loaded.iter().all(|dataset| dataset.subjects.is_empty())
             && let Some(Unreadable { problem, .. }) = broken.next()

@@ -41,6 +41,9 @@ fn text(dataset: &Dataset) -> Result<String> {
     }
     if let Some(layout) = dataset.reader() {
         text += &format!("\nLayout {}: {}\n", layout.id, layout.summary);
+        for part in layout.parts {
+            text += &format!("  {:<24} {}\n", part.what, part.place);
+        }
     }
     text += "\nA folder per subject:\n";
     for folder in dataset.subject_folders().unwrap_or_default() {
@@ -58,9 +61,16 @@ fn text(dataset: &Dataset) -> Result<String> {
         );
     }
     text += "\nThe entry of datasets.toml (paths are relative to that file):\n\n";
-    text += &toml::to_string(&BTreeMap::from([("dataset", [dataset])]))?;
-    text += &format!("\nThen: reproduce check {}\n", dataset.id);
+    let mut entry = toml::Table::try_from(dataset)?;
+    entry.retain(|_, value| !says_nothing(value));
+    text += &toml::to_string(&BTreeMap::from([("dataset", [entry])]))?;
+    text += &format!("\nThen: reproduce inspect FOLDER, and reproduce check {}\n", dataset.id);
     Ok(text)
+}
+
+/// True for lists and tables that are empty, as they are where a file leaves them out.
+fn says_nothing(value: &toml::Value) -> bool {
+    value.as_table().is_some_and(toml::Table::is_empty) || value.as_array().is_some_and(Vec::is_empty)
 }
 
 fn state(path: &Path) -> &'static str {

@@ -1,5 +1,6 @@
 //! `reproduce inspect`: what a file holds, and what is wrong with it.
 
+mod folder;
 mod needs;
 
 use super::Exit;
@@ -11,16 +12,15 @@ use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, Binding, Body, Image, Mask};
 use skinsplat_data::arrays::Arrays;
 use skinsplat_data::avatar::{Canonical, LoadedAvatar, read_avatar};
-use skinsplat_data::folder::{self, Options};
 use skinsplat_data::poses::PoseTrack;
-use skinsplat_data::{Subject, body, camera, frames, poses, splatting_avatar};
+use skinsplat_data::{body, camera, frames, poses};
 use std::path::{Path, PathBuf};
 
 /// Show what a file or folder holds, and what is wrong with it.
 ///
 /// Reads avatars (.ply, .npz, .pth, .ckpt, exports of SplattingAvatar), bodies (.npz, .pkl, .glb, .gltf), poses and cameras
-/// (.npz, .pkl, .json), images, a subject's folder, a
-/// folder of subjects, results.json and the results store of a run.
+/// (.npz, .pkl, .json), images, results.json and the results store of a run; and folders: a subject in any of the layouts that
+/// are read, folders of subjects, exports of SplattingAvatar, images that another program rendered.
 #[derive(Debug, clap::Args)]
 pub(super) struct Inspect {
     /// What to look at
@@ -39,7 +39,7 @@ impl Inspect {
         }
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         let text = match extension.as_str() {
-            _ if path.is_dir() => folder_text(path)?,
+            _ if path.is_dir() => folder::text(path)?,
             "ply" | "pth" | "pt" | "ckpt" | "spz" | "splat" | "ksplat" | "sog" => {
                 avatar_text(&read_avatar(path)?)
             }
@@ -174,15 +174,21 @@ fn arrays_text(path: &Path) -> Result<String> {
         return Ok(text + &avatar_text(&read_avatar(path)?));
     }
     if has("v_template") {
-        return Ok(text + &body_text(&body::read(path)?));
+        return Ok(text + &body_text(&body::read(path)?) + &unread_text(&arrays.names(), &body::ARRAYS));
     }
     if has("intrinsic") || has("K") {
-        return Ok(text + &cameras_text(path)?);
+        return Ok(text + &cameras_text(path)? + &unread_text(&arrays.names(), &camera::ARRAYS));
     }
     if poses::is_motion(&arrays) {
         return Ok(text + &motion_text(&poses::load(path)?));
     }
-    Ok(text)
+    Ok(text + &unread_text(&arrays.names(), &[]))
+}
+
+/// Arrays that nothing reads.
+fn unread_text(names: &[String], read: &[&str]) -> String {
+    let left: Vec<String> = names.iter().filter(|name| !read.contains(&name.as_str())).cloned().collect();
+    if left.is_empty() { String::new() } else { line("not read", listed(&left)) }
 }
 
 fn motion_text(track: &PoseTrack) -> String {
@@ -250,33 +256,6 @@ fn image_text((image, alpha): &(Image, Option<Mask>)) -> String {
     text += &line("values", spread(image.pixels().iter().flatten().copied()));
     if let Some(alpha) = alpha {
         text += &line("alpha", spread(alpha.values().iter().copied()));
-    }
-    text
-}
-
-fn folder_text(path: &Path) -> Result<String> {
-    if path.join(splatting_avatar::GAUSSIANS).is_file() || path.join("point_cloud").is_dir() {
-        return Ok(avatar_text(&read_avatar(path)?));
-    }
-    if folder::is_subject(path) {
-        return Ok(line("kind", "subject") + &subject_text(&Subject::load(path, &Options::default())?));
-    }
-    let registry = skinsplat::datasets::Registry::scan(path)?;
-    let mut text = line("kind", "folder of subjects");
-    for dataset in &registry.datasets {
-        for subject in dataset.load(&Options::default())? {
-            text += &subject_text(&subject);
-        }
-    }
-    Ok(text)
-}
-
-fn subject_text(subject: &Subject) -> String {
-    let mut text =
-        line("subject", &subject.id) + &line("capture", format!("{:?}", subject.capture).to_lowercase());
-    for sequence in subject.sequences() {
-        let (frames, poses, cameras) = (sequence.frames.len(), sequence.poses.len(), sequence.cameras.len());
-        text += &line(&sequence.id, format!("{frames} frames, {poses} poses, {cameras} cameras"));
     }
     text
 }

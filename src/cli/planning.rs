@@ -149,7 +149,15 @@ impl Planning {
 
 /// A folder in which no frame of any sequence was found is a mistake; gaps are named by the tables.
 fn renders_were_found(datasets: &[experiment::Dataset]) -> Result<()> {
-    let all = || datasets.iter().flat_map(|d| &d.subjects).flat_map(|subject| &subject.renders);
+    // One subject may be there on several bodies: the same frames.
+    let frames = |renders: &experiment::RenderedFrames| (renders.folder.clone(), renders.sequence.clone());
+    let mut seen = BTreeSet::new();
+    let all: Vec<_> = (datasets.iter().flat_map(|d| d.subjects.iter().map(move |s| (d.registered_id(), s))))
+        .flat_map(|(id, subject)| subject.renders.iter().map(move |renders| (id, subject, renders)))
+        .filter(|(id, subject, renders)| seen.insert((*id, &subject.id, frames(renders))))
+        .map(|(.., renders)| renders)
+        .collect();
+    let all = || all.iter().copied();
     for renders in all() {
         if all().filter(|own| own.path == renders.path).all(|own| own.frames.is_empty()) {
             let expected = "images named as the test frames, such as image_0001.png";

@@ -7,6 +7,7 @@ use anyhow::{Context as _, Result};
 use skinsplat::experiment::{Records, Shard, Unreadable};
 use skinsplat::report;
 use skinsplat::run::gallery;
+use skinsplat::run::motion::{self, Motion};
 use skinsplat::run::provenance::Provenance;
 use skinsplat::run::store::{self, FILE_NAME, Store};
 use skinsplat::run::{self, Error};
@@ -39,6 +40,17 @@ pub(super) struct Run {
     /// Also write images/: where the variants differ most, truth and variants side by side with their errors
     #[arg(long, conflicts_with = "shard")]
     images: bool,
+    /// Also write motion/: the avatars of every variant under a motion (smplx, AMASS or AIST++ .npz or .pkl, transforms.json,
+    /// .glb or .gltf), as motion/TABLE/SUBJECT/VARIANT/frame_0000.png. Each keeps its shape, starts where the first test frame
+    /// of its row has it, and is seen by that frame's camera. Nothing is scored: no true images exist
+    #[arg(long, value_name = "POSES", conflicts_with = "shard")]
+    motion: Option<PathBuf>,
+    /// Clip of a glTF file with several
+    #[arg(long, value_name = "NAME", requires = "motion")]
+    motion_clip: Option<String>,
+    /// Draw only every N-th pose of the motion
+    #[arg(long, value_name = "N", requires = "motion", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    motion_every: u32,
     /// Forget what the folder's results store knows
     #[arg(long, conflicts_with = "shard")]
     fresh: bool,
@@ -49,14 +61,17 @@ Examples:
   reproduce run                                  all six tables on built-in data
   reproduce run table3 --all-strategies          one table, a row per strategy
   reproduce run --data DIR --profile standard    all tables on the subjects of a folder
-  reproduce run my.toml --out runs/mine          a table of your own";
+  reproduce run my.toml --out runs/mine          a table of your own
+  reproduce run table3 --motion dance.npz        Table 3, and its avatars dancing";
 
 impl Run {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let start = Instant::now();
-        let planned = self.planning.plan()?;
+        let mut planned = self.planning.plan()?;
+        let motion = self.motion(&mut planned, context)?;
         let mut provenance = Provenance::starting(&planned.plan.digest);
         make_folder(&self.out)?;
+        [self.out.clone(), self.out.join(AVATARS)].iter().for_each(|folder| atomic::sweep(folder));
         if self.fresh {
             for path in stores(&self.out)? {
                 std::fs::remove_file(&path).with_context(|| format!("{}: cannot remove", path.display()))?;
@@ -68,7 +83,7 @@ impl Run {
         if self.shard.is_some() {
             return self.verdict_of_shard(&planned, context);
         }
-        self.write(&planned, &provenance, context)
+        self.write(&planned, motion.as_ref(), &provenance, context)
     }
 
     /// Renders what is left to do; says how many frames that were.
@@ -102,7 +117,13 @@ impl Run {
     }
 
     /// The tables, from every record in the folder.
-    fn write(&self, planned: &Planned, provenance: &Provenance, context: Context) -> Result<Exit> {
+    fn write(
+        &self,
+        planned: &Planned,
+        motion: Option<&Motion>,
+        provenance: &Provenance,
+        context: Context,
+    ) -> Result<Exit> {
         let records: Records = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
         let results = report::results(&planned.plan, &planned.experiments, &records)?;
         write_results(&self.out, &results)?;
@@ -110,6 +131,9 @@ impl Run {
         write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
         if self.images {
             self.write_images(planned, &records, context)?;
+        }
+        if let Some(motion) = motion {
+            self.write_motion(planned, motion, context)?;
         }
         emit(&report::page(&results))?;
         let out = self.out.display();
@@ -119,7 +143,11 @@ impl Run {
             context.note(format!("{missing} scores are missing; {out}/{FILE_NAME} says why"));
             return Ok(Exit::Incomplete);
         }
-        let mut unreadable = planned.library.unreadable().peekable();
+        // Those that nobody asked for are missed by nobody.
+        let asked = &planned.plan.options.subset.subjects;
+        let unreadable = planned.library.unreadable();
+        let mut unreadable =
+            unreadable.filter(|(_, own)| asked.is_empty() || asked.contains(&own.subject)).peekable();
         if unreadable.peek().is_some() {
             for (dataset, Unreadable { subject, problem }) in unreadable {
                 context.note(format!("{dataset}/{subject}: left out: {problem}"));
@@ -150,6 +178,27 @@ impl Run {
         Ok(())
     }
 
+    /// The motion that the arguments name, with a word in the captions.
+    fn motion(&self, planned: &mut Planned, context: Context) -> Result<Option<Motion>> {
+        let Some(path) = &self.motion else { return Ok(None) };
+        let motion = Motion::load(path, self.motion_clip.as_deref(), self.motion_every as usize)?;
+        for note in motion.announce(&mut planned.plan, &planned.library)? {
+            context.note(note);
+        }
+        Ok(Some(motion))
+    }
+
+    fn write_motion(
+        &self,
+        Planned { plan, library, .. }: &Planned,
+        motion: &Motion,
+        context: Context,
+    ) -> Result<()> {
+        let watch = Watch::new(context.quiet);
+        let (avatars, folder) = (self.out.join(AVATARS), self.out.join("motion"));
+        Ok(motion::write(plan, library, motion, &avatars, &folder, &|event| watch.see(event))?)
+    }
+
     fn write_images(
         &self,
         Planned { plan, library, .. }: &Planned,
@@ -176,7 +225,8 @@ pub(super) fn stores(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(context)? {
         let path = entry.with_context(context)?.path();
-        if path.extension().is_some_and(|e| e == "jsonl") {
+        // A pipe of such a name would be waited for.
+        if path.extension().is_some_and(|e| e == "jsonl") && path.is_file() {
             paths.push(path);
         }
     }

@@ -62,6 +62,7 @@ impl Dataset {
                 train,
                 test,
                 notes: Vec::new(),
+                shapes: Vec::new(),
             });
         }
         let folder = self.subject_folders().and_then(|folders| folders.into_iter().nth(place));

@@ -1,5 +1,6 @@
 //! What the planner knows about data: names, counts and digests, no pixels.
 
+use super::spec::OWN_BODIES;
 use serde::{Deserialize, Serialize};
 use skinsplat_data::Capture;
 use std::collections::BTreeMap;
@@ -128,6 +129,18 @@ pub struct Dataset {
     /// Subjects that cannot be used.
     #[serde(default)]
     pub unreadable: Vec<Unreadable>,
+}
+
+impl Dataset {
+    /// What the registry calls it: its id without the experiment whose bodies it was loaded on.
+    pub fn registered_id(&self) -> &str {
+        self.id.split(OWN_BODIES).next().unwrap_or(&self.id)
+    }
+
+    /// True if it was loaded on the bodies of one experiment, and is for no other.
+    pub fn is_for_one_table(&self) -> bool {
+        self.id.contains(OWN_BODIES)
+    }
 }
 
 /// A subject that cannot be used.

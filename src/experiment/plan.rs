@@ -66,6 +66,9 @@ pub struct PlannedTable {
     /// What a reader has to know of the data, a clause per subject.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub data_notes: Vec<String>,
+    /// Sentences of the caption on what else the run makes of the table's avatars: no number depends on it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
 }
 
 /// One test frame of one table: the truth is loaded once and every variant is rendered and scored against it, so that
@@ -182,10 +185,23 @@ impl Builder<'_> {
             self.add_jobs((index, row_index), row, experiment, (&protocol, resolution), &prepared);
         }
         let used = |dataset: &&Dataset| rows.iter().any(|row| row.dataset == dataset.id);
-        let datasets = self.datasets.iter().filter(used).map(|d| (d.id.clone(), d.title.clone())).collect();
-        let data_notes = self.data_notes(&rows);
+        let datasets = self
+            .datasets
+            .iter()
+            .filter(used)
+            .map(|d| (d.registered_id().to_owned(), d.title.clone()))
+            .collect();
+        let mut data_notes = self.data_notes(&rows);
+        if source == Source::Own
+            && experiment.has_own_bodies()
+            && rows.iter().all(|row| row.dataset == experiment.dataset)
+        {
+            let note = "on the subjects' own body templates, where the table asks for others";
+            data_notes.push(format!("{}: {note}", experiment.dataset));
+        }
         Ok(PlannedTable {
             data_notes,
+            remarks: Vec::new(),
             experiment: experiment.id.clone(),
             source,
             datasets,

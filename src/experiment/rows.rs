@@ -43,7 +43,9 @@ pub(super) fn rows_of(
     datasets: &[Dataset],
     options: &Options,
 ) -> (Source, Vec<DataRow>) {
-    let own = datasets.iter().find(|dataset| dataset.id == experiment.dataset);
+    // Who loads data without asking for the table's bodies has the subjects' own.
+    let named = |id: &str| datasets.iter().find(|dataset| dataset.id == id);
+    let own = named(&experiment.data_id()).or_else(|| named(&experiment.dataset));
     let stand_in = match (own, &experiment.stand_in) {
         // Where nothing of it can be used, a stand-in is of more use than rows of reasons.
         (Some(own), stand_in) if stand_in.is_none() || !own.subjects.is_empty() => {
@@ -53,10 +55,10 @@ pub(super) fn rows_of(
         (_, None) => return (Source::Absent, Vec::new()),
     };
     let fits = |s: &&SubjectInfo| stand_in.capture.is_none_or(|capture| s.capture == capture);
-    let of_kind = |d: &&Dataset| d.subjects.iter().any(|s| fits(&s));
+    let of_kind = |d: &&Dataset| !d.is_for_one_table() && d.subjects.iter().any(|s| fits(&s));
     let several = datasets.iter().filter(of_kind).count() > 1;
     let mut rows = Vec::new();
-    for dataset in datasets {
+    for dataset in datasets.iter().filter(of_kind) {
         for subject in dataset.subjects.iter().filter(|s| fits(s) && chosen(options, &s.id)) {
             for mut row in stand_in_rows(stand_in, dataset, subject, options) {
                 if several && dataset.id != subject.id {
@@ -95,7 +97,7 @@ fn own_rows(experiment: &Experiment, dataset: &Dataset, options: &Options) -> Ve
                 Some(_) => format!("no test sequence of `{id}` matches the experiment's split"),
             };
             rows.push(DataRow {
-                id: format!("{}/{id}", dataset.id),
+                id: format!("{}/{id}", dataset.registered_id()),
                 label: id.into(),
                 dataset: dataset.id.clone(),
                 subject: id.into(),
@@ -192,7 +194,7 @@ fn data_row(
     };
     let thin = |frames: Vec<usize>| evenly_spaced(&frames, options.profile.max_train_frames);
     DataRow {
-        id: format!("{}/{}/{}", dataset.id, subject.id, test.id),
+        id: format!("{}/{}/{}", dataset.registered_id(), subject.id, test.id),
         label,
         dataset: dataset.id.clone(),
         subject: subject.id.clone(),

@@ -2,7 +2,7 @@
 
 use super::{EMBEDDED, Error, FURTHER, Paper, Profile, Replicate, Source, Split, catalog, seeds, validate};
 use serde::{Deserialize, Serialize};
-use skinsplat_data::Capture;
+use skinsplat_data::{Capture, Gender};
 use skinsplat_metrics::MetricId;
 use skinsplat_posing::PRESETS;
 use std::collections::BTreeMap;
@@ -10,6 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// How the ids of variants begin that [`Experiment::with_all_strategies`] adds.
 pub const ADDED_VARIANT: &str = "strategy-";
+
+/// Between the id of a data set and that of the experiment for which it was loaded on other bodies.
+pub(super) const OWN_BODIES: char = '@';
 
 /// How the names of avatars begin that the command line gives to a variant, whose id follows.
 pub const GIVEN_AVATAR: &str = "--avatar ";
@@ -45,6 +48,10 @@ pub struct Experiment {
     /// Subjects of the data set, in printed order; all of them if empty.
     #[serde(default)]
     pub sequences: Vec<String>,
+    /// Gender of the body model by subject, where the compared method takes another than the subject's own. A model file that
+    /// the registry gives goes before it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub genders: BTreeMap<String, Gender>,
     /// Shape of the table.
     pub layout: Layout,
     /// Id of the variant with which the others are compared frame by frame.
@@ -229,6 +236,19 @@ impl AvatarRecipe {
 }
 
 impl Experiment {
+    /// True if it asks for other bodies than its data set's subjects have.
+    pub fn has_own_bodies(&self) -> bool {
+        !self.genders.is_empty()
+    }
+
+    /// Id under which its own data is loaded: the data set's, or one of its own where it asks for other bodies.
+    pub fn data_id(&self) -> String {
+        match self.has_own_bodies() {
+            true => format!("{}{OWN_BODIES}{}", self.dataset, self.id),
+            false => self.dataset.clone(),
+        }
+    }
+
     /// Reads one experiment file.
     ///
     /// # Errors

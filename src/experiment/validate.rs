@@ -40,6 +40,10 @@ pub(super) fn experiment(e: &Experiment, file: &str) -> Result<(), Error> {
     let average = e.average.iter().map(|average| average.label.as_str());
     distinct_in(file, "sequences, average.label", e.sequences.iter().map(String::as_str).chain(average))?;
     distinct_in(file, "splits.sequence", e.splits.iter().map(|s| s.sequence.as_str()))?;
+    let stranger = |id: &&String| !e.sequences.is_empty() && !e.sequences.contains(id);
+    if let Some(id) = e.genders.keys().find(stranger) {
+        return fail("genders", format!("`{id}`"), "subjects of `sequences`");
+    }
     if e.variant(&e.baseline).is_none() {
         return fail("baseline", format!("`{}`", e.baseline), "the id of one of the variants");
     }

@@ -52,6 +52,7 @@ pub(super) fn ran_on(
         sentences.push(subset(&options.subset));
     }
     sentences.extend(planned.data_notes.iter().map(|note| format!("Data of {note}")));
+    sentences.extend(planned.remarks.iter().cloned());
     if let Some(average) = &experiment.average {
         sentences.push(format!("{}: each sequence counts once", average.label));
     }

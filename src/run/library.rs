@@ -132,6 +132,7 @@ fn describe_subject(
     let renders = renders.collect::<Result<_, _>>()?;
     let split_given = dataset.splits_given.contains(&subject.id);
     let mut notes = subject.notes.clone();
+    notes.extend(check::subject(subject).iter().map(|found| format!("check finds {}", found.kind)));
     notes.extend(subject.sequences().flat_map(misfits));
     let (id, capture) = (subject.id.clone(), subject.capture);
     Ok(SubjectInfo { id, capture, sequences, split_given, notes, avatars, renders })

@@ -2,10 +2,11 @@
 //!
 //! [`Library`] holds the data at hand, `avatars` makes or reads what is to be drawn, a
 //! [`Drawable`](drawable::Drawable); `frame` is where one is drawn in a pose and scored. [`execute()`] walks the frames,
-//! [`store`] remembers every record by its content key, [`gallery`] shows where the variants differ.
+//! [`store`] remembers every record by its content key, [`gallery`] shows where the variants differ, [`motion`]
+//! draws them in poses that no frame has.
 //!
 //! Each file imports only from those before it in this list: `textured`, `foreign`, `drawable`, `library`, `frame`,
-//! `held_out`, `cache`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`.
+//! `held_out`, `cache`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`, `motion`.
 
 mod avatars;
 pub mod cache;
@@ -20,8 +21,9 @@ mod frame;
 pub mod gallery;
 pub mod held_out;
 mod library;
+pub mod motion;
 pub mod provenance;
-mod renders;
+pub mod renders;
 pub mod store;
 pub mod textured;
 

@@ -37,6 +37,45 @@ pub(super) fn place(path: &Path, subject: &str, sequence: &str) -> PathBuf {
     }
 }
 
+/// What lies in a folder of renders, whatever they are of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RenderFolder {
+    /// Names of the images, as frames would be named, sorted.
+    pub frames: Vec<String>,
+    /// Width and height of the first.
+    pub size: Option<[usize; 2]>,
+    /// What `renders.json` says: names and numbers.
+    pub said: Vec<(&'static str, String)>,
+}
+
+/// What lies in a folder of images; none if it holds no image.
+///
+/// # Errors
+/// Files that cannot be read, two images of one name, a `renders.json` with other fields.
+pub fn look(folder: &Path) -> Result<Option<RenderFolder>, DataError> {
+    let images = images_of(folder)?;
+    let Some(first) = images.values().next() else { return Ok(None) };
+    let (image, _) = frames::load_image(first)?;
+    let Said { splats, bytes, milliseconds } = said(folder)?;
+    let said = [
+        ("splats", splats.map(|n| n.to_string())),
+        ("bytes", bytes.map(|n| n.to_string())),
+        ("milliseconds", milliseconds.map(|n| n.to_string())),
+    ];
+    let said = said.into_iter().filter_map(|(name, value)| Some((name, value?))).collect();
+    let size = Some([image.width(), image.height()]);
+    Ok(Some(RenderFolder { frames: images.into_keys().collect(), size, said }))
+}
+
+/// What a folder says about its frames.
+fn said(folder: &Path) -> Result<Said, DataError> {
+    let path = folder.join(SAID);
+    match path.is_file() {
+        true => error::read_json(&path, "renders", "splats, bytes and milliseconds, each a number"),
+        false => Ok(Said::default()),
+    }
+}
+
 /// What lies in a folder, paired with the frames of a sequence. A folder that is not there has no frames.
 ///
 /// # Errors
@@ -55,12 +94,7 @@ pub(super) fn describe(path: &Path, subject: &str, sequence: &Sequence) -> Resul
         .map(|(name, file)| Ok((name.as_str(), file_digest(file)?)))
         .collect::<Result<_, DataError>>()?;
     let digest = skinsplat_data::key::content_key(&serde_json::json!(digests));
-    let said = folder.join(SAID);
-    let said: Said = match said.is_file() {
-        true => error::read_json(&said, "renders", "splats, bytes and milliseconds, each a number")?,
-        false => Said::default(),
-    };
-    let (splats, bytes, milliseconds) = (said.splats, said.bytes, said.milliseconds);
+    let Said { splats, bytes, milliseconds } = said(&folder)?;
     let (path, sequence) = (path.to_owned(), sequence.id.clone());
     Ok(RenderedFrames { path, folder, sequence, frames, digest, splats, bytes, milliseconds })
 }

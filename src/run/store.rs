@@ -14,7 +14,7 @@ use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Records};
 use serde::{Deserialize, Serialize};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{File, OpenOptions};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -178,12 +178,17 @@ impl Store {
 
 /// The bytes of a regular file. A device can neither be cut off nor read to its end.
 fn whole(file: &mut File) -> io::Result<Vec<u8>> {
-    if !file.metadata()?.is_file() {
-        return Err(io::Error::other("not a regular file; expected one to which records can be appended"));
-    }
+    refuse_devices(&file.metadata()?)?;
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes)?;
     Ok(bytes)
+}
+
+fn refuse_devices(metadata: &Metadata) -> io::Result<()> {
+    match metadata.is_file() {
+        true => Ok(()),
+        false => Err(io::Error::other("not a regular file; expected one to which records can be appended")),
+    }
 }
 
 /// Cuts a file off after a number of bytes.
@@ -196,7 +201,9 @@ fn cut(path: &Path, length: u64) -> io::Result<()> {
 /// # Errors
 /// If the file cannot be read, is not a store, or holds two results for one key.
 pub fn read(path: &Path) -> Result<Records, Error> {
-    let bytes = File::open(path).and_then(|mut file| whole(&mut file));
+    // A pipe waits for a writer when it is opened.
+    let regular = std::fs::metadata(path).and_then(|metadata| refuse_devices(&metadata));
+    let bytes = regular.and_then(|()| whole(&mut File::open(path)?));
     let bytes = bytes.map_err(|source| Error::Io { path: path.into(), source })?;
     Ok(parse(&bytes, path)?.records)
 }

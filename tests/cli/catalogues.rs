@@ -63,7 +63,7 @@ fn inspect_refuses_what_it_does_not_know() {
         ("other.json", vec!["other.json"]),
         ("broken.json", vec!["broken.json", "line 1"]),
         ("frames.jsonl", vec!["frames.jsonl:1", "not a results store"]),
-        ("empty", vec!["empty", "datasets", "expected subjects"]),
+        ("empty", vec!["empty: folder: nothing that is known", "a folder of subjects", "neuman"]),
         ("nothing.ply", vec!["nothing.ply", "No such file"]),
         ("nothing", vec!["nothing"]),
     ] {
@@ -156,4 +156,13 @@ fn a_plan_and_its_keys_do_not_depend_on_the_c_library() {
         output.stdout
     };
     assert!(plan(None) == plan(Some(OTHER_KERNELS)), "the keys differ");
+}
+
+#[test]
+fn help_with_fetching_lists_the_files_and_an_entry_without_empty_tables() {
+    let text = Desk::new().ok(args!["fetch-help", "neuman"]);
+    for part in ["sparse/images.txt", "4d_humans/sam_segmentations", "reproduce inspect", "id = \"neuman\""] {
+        assert!(text.contains(part), "no `{part}` in {text}");
+    }
+    assert!(!text.contains("[dataset.splits]") && !text.contains("avatars = []"), "{text}");
 }

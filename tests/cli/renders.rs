@@ -53,31 +53,23 @@ fn renders_are_scored_under_the_protocol_of_the_table() {
         .map(|(i, line)| if i == surface { format!("avatar = {recipe}") } else { line.to_owned() })
         .collect();
     desk.put("folder/own.toml", lines.join("\n"));
-    desk.run(args![
-        "-q",
-        "run",
-        "folder/own.toml",
-        "--data",
-        data("small"),
-        "--variant",
-        "surface",
-        "--out",
-        "own"
-    ])
-    .exits(2, "no renders below the experiment's folder");
+    let own_run = || {
+        let small = data("small");
+        desk.run(args![
+            "-q",
+            "run",
+            "folder/own.toml",
+            "--data",
+            small,
+            "--variant",
+            "surface",
+            "--out",
+            "own"
+        ])
+    };
+    own_run().exits(2, "no renders below the experiment's folder");
     std::fs::rename(desk.path("theirs"), desk.path("folder/theirs")).unwrap();
-    desk.run(args![
-        "-q",
-        "run",
-        "folder/own.toml",
-        "--data",
-        data("small"),
-        "--variant",
-        "surface",
-        "--out",
-        "own"
-    ])
-    .exits(0, "renders below the experiment's folder");
+    own_run().exits(0, "renders below the experiment's folder");
     assert_eq!(variant(&desk, "own", "surface")["summary"]["identical_frames"], 3);
 }
 

@@ -158,3 +158,27 @@ fn the_built_in_registry_looks_in_the_current_folder() {
     copy(&data("small/tiny"), &place);
     assert!(line(&listed(&desk), "snapshot_ava ").ends_with("  available"), "{text}");
 }
+
+/// What is no file of records is none, whatever its name: a pipe would be waited for.
+#[cfg(unix)]
+#[test]
+fn pipes_named_like_stores_are_left_alone() {
+    let desk = Desk::new();
+    desk.put("small.toml", include_str!("small.toml"));
+    std::fs::create_dir(desk.path("run")).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(desk.path("run/frames-9.jsonl")).status().unwrap();
+    assert!(made.success());
+    let run =
+        || args!["-q", "run", "small.toml", "--data", data("small"), "--variant", "surface", "--out", "run"];
+    desk.run(run()).exits(0, "a pipe beside the store");
+    desk.run(args!["inspect", "run/frames-9.jsonl"]).refuses(&["frames-9.jsonl", "regular file"], "a pipe");
+    // What a killed run left is swept, once nobody can be writing to it.
+    let left = desk.put("run/avatars/.writing-x", "half");
+    desk.run(run()).exits(0, "another's unfinished file");
+    assert!(left.exists());
+    let day = std::time::Duration::from_secs(86_400);
+    let file = std::fs::File::options().write(true).open(&left).unwrap();
+    file.set_modified(std::time::SystemTime::now() - day).unwrap();
+    desk.run(run()).exits(0, "an abandoned file");
+    assert!(!left.exists());
+}

@@ -169,9 +169,7 @@ impl Arrays {
 
     /// An error about a field that is not there.
     pub(crate) fn missing(&self, name: &str, expected: &str) -> Error {
-        // Names are whatever the file says: one line in any case.
-        let names: Vec<String> = self.names().iter().map(|name| name.escape_debug().to_string()).collect();
-        self.invalid(name, format!("missing; the file holds {}", names.join(", ")), expected)
+        Error::missing(self.path(), name, &self.names(), expected)
     }
 }
 

@@ -4,6 +4,30 @@ use super::Error;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::time::Duration;
+
+/// How the names of files begin that are not complete yet.
+const UNFINISHED: &str = ".writing-";
+
+/// A file that nobody has written to for so long is left over from a program that was killed.
+const ABANDONED: Duration = Duration::from_secs(3600);
+
+/// Removes what programs left in a folder that were killed while they wrote: unfinished files that nobody has written to for an
+/// hour. Others may be another process's. What cannot be removed stays.
+pub fn sweep(folder: &Path) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let unfinished = entry.file_name().to_str().is_some_and(|name| name.starts_with(UNFINISHED));
+        let idle = |metadata: std::fs::Metadata| {
+            metadata.is_file()
+                && metadata.modified().is_ok_and(|at| at.elapsed().is_ok_and(|idle| idle > ABANDONED))
+        };
+        if unfinished && entry.metadata().is_ok_and(idle) {
+            // Another process may have swept it: that is as good.
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
 
 /// Writes `path` through `fill`. A regular file appears complete or not at all, and replaces an older one at once; a
 /// device or a pipe (`/dev/stdout`) is written to directly, since it must not be replaced.
@@ -27,7 +51,7 @@ fn beside(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()
         _ => Path::new("."),
     };
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".writing-");
+    builder.prefix(UNFINISHED);
     #[cfg(unix)]
     {
         // The usual mode of a new file (the umask still applies), not the private one of a temporary file.
@@ -68,6 +92,22 @@ mod tests {
         assert_eq!((std::fs::read(&path).unwrap(), entries(folder.path())), (b"first".to_vec(), 1));
         write(&path, |w| w.write_all(b"second")).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"second");
+    }
+
+    #[test]
+    fn only_abandoned_files_are_swept() {
+        let folder = tempfile::tempdir().unwrap();
+        let old = std::time::SystemTime::now() - 2 * ABANDONED;
+        for (name, age) in [(".writing-a", Some(old)), (".writing-b", None), ("kept", Some(old))] {
+            let file = File::create(folder.path().join(name)).unwrap();
+            if let Some(age) = age {
+                file.set_modified(age).unwrap();
+            }
+        }
+        sweep(folder.path());
+        sweep(&folder.path().join("missing"));
+        let left = |name| folder.path().join(name).exists();
+        assert_eq!([left(".writing-a"), left(".writing-b"), left("kept")], [false, true, true]);
     }
 
     #[test]

@@ -66,6 +66,18 @@ impl Error {
         Self::invalid(path, error.field, error.problem, error.expected)
     }
 
+    /// A name that a file of named things does not hold, among those that it holds. Names are whatever the file says: one line
+    /// in any case.
+    pub(crate) fn missing(path: &Path, name: &str, names: &[String], expected: &str) -> Self {
+        const MOST: usize = 40;
+        let mut shown: Vec<String> =
+            names.iter().take(MOST).map(|name| name.escape_debug().to_string()).collect();
+        if names.len() > MOST {
+            shown.push(format!("{} more", names.len() - MOST));
+        }
+        Self::invalid(path, name, format!("missing; the file holds {}", shown.join(", ")), expected)
+    }
+
     /// A file that could not be read.
     pub fn read(
         path: impl Into<PathBuf>,

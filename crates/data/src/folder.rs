@@ -10,7 +10,7 @@
 //! ```
 //! Sequences named `train*` are for fitting, those named `test*` for evaluation.
 
-use super::models::Models;
+use super::models::{Gender, Models, ShapeFit};
 use super::poses::{self, PoseTrack};
 use super::{Capture, Error, Sequence, camera, error, listing};
 use super::{FrameFiles, FrameRef, FrameSource, MaskFile};
@@ -23,6 +23,9 @@ use std::path::{Path, PathBuf};
 pub struct Options {
     /// A body model to use instead of the one that the sequences name, or a folder of models by gender.
     pub model: Option<PathBuf>,
+    /// The gender of the body model where a data set tells it by gender, instead of the subject's own: some methods fit one
+    /// template to everybody.
+    pub gender: Option<Gender>,
     /// Displace the body by `gt_normal_offset.npy`. Off by default: an evaluation does not know the clothing.
     pub clothing: bool,
 }
@@ -40,6 +43,8 @@ pub struct Subject {
     pub test: Vec<Sequence>,
     /// What was guessed, left out or not read, a sentence each.
     pub notes: Vec<String>,
+    /// Shapes that were asked of its body models.
+    pub shapes: Vec<ShapeFit>,
 }
 
 impl Subject {
@@ -59,7 +64,14 @@ impl Subject {
         let joints = sequences().map(|s| s.body.skeleton.num_joints()).max();
         let capture = capture_of(folder, cameras.zip(joints))?;
         let id = listing::file_name(folder);
-        Ok(Self { id, capture, train, test, notes: models.notes().to_vec() })
+        Ok(Self {
+            id,
+            capture,
+            train,
+            test,
+            notes: models.notes().to_vec(),
+            shapes: models.shapes().to_vec(),
+        })
     }
 
     /// All sequences, training first.

@@ -3,16 +3,21 @@
 use super::folder::Options;
 use super::poses::PoseTrack;
 use super::{Error, body, listing, npy};
+use serde::{Deserialize, Serialize};
 use skinsplat_core::scene::{Body, RestBody};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Which of the bodies of a family a subject has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Gender {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gender {
+    /// The female template.
     Female,
+    /// The male template.
     Male,
+    /// The template of both.
     Neutral,
 }
 
@@ -72,12 +77,24 @@ impl Family {
     }
 }
 
+/// How many shape coefficients a subject's files have for how many directions of its body model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShapeFit {
+    /// The file with the coefficients.
+    pub file: PathBuf,
+    /// Coefficients up to the last that is not zero.
+    pub betas: usize,
+    /// Directions of the model: further coefficients are left out.
+    pub directions: usize,
+}
+
 /// Body models that were loaded for a subject, and the shapes of them that its sequences share.
 pub(crate) struct Models<'a> {
     subject: &'a Path,
     options: &'a Options,
     loaded: BTreeMap<PathBuf, Model>,
     notes: Vec<String>,
+    shapes: Vec<ShapeFit>,
 }
 
 struct Model {
@@ -88,12 +105,17 @@ struct Model {
 
 impl<'a> Models<'a> {
     pub(crate) fn new(subject: &'a Path, options: &'a Options) -> Self {
-        Self { subject, options, loaded: BTreeMap::new(), notes: Vec::new() }
+        Self { subject, options, loaded: BTreeMap::new(), notes: Vec::new(), shapes: Vec::new() }
     }
 
     /// What has to be said of the models and of the shapes that were asked for, each once and with its file.
     pub(crate) fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// The shapes that were asked for, each once.
+    pub(crate) fn shapes(&self) -> &[ShapeFit] {
+        &self.shapes
     }
 
     fn note(&mut self, path: &Path, note: &str) {
@@ -115,7 +137,7 @@ impl<'a> Models<'a> {
         self.posed(source, &path, track)
     }
 
-    /// As [`Models::of_track`], of the model that is told by family and gender.
+    /// As [`Models::of_track`], of the model that is told by family and gender; [`Options::gender`] goes before the subject's.
     pub(crate) fn of_person(
         &mut self,
         source: &Path,
@@ -123,13 +145,33 @@ impl<'a> Models<'a> {
         gender: Gender,
         track: &PoseTrack,
     ) -> Result<Arc<RestBody>, Error> {
-        let path = self.path_of(source, family, gender)?;
+        let asked = self.options.gender.unwrap_or(gender);
+        let path = self.path_of(source, family, asked)?;
         let body = self.posed(source, &path, track)?;
-        // A model that was given may be another's.
-        if let Some(other) = Gender::in_name(&listing::stem(&path)).filter(|own| *own != gender) {
-            self.note(&path, &format!("a {} body; the subject is {}", other.word(), gender.word()));
+        if let Some(note) = self.other_gender(&path, gender) {
+            self.note(&path, &note);
         }
         Ok(body)
+    }
+
+    /// What has to be said of a body of another gender than the subject's, or than was asked for: a model that was given may
+    /// be another's.
+    fn other_gender(&self, path: &Path, subject: Gender) -> Option<String> {
+        let asked = self.options.gender;
+        let given = self.options.model.as_deref().is_some_and(|model| model == path);
+        let own = Gender::in_name(&listing::stem(path)).or(asked.filter(|_| !given))?;
+        let word = own.word();
+        match asked {
+            Some(asked) if asked != own => Some(format!(
+                "a {word} body, which the registry gives; the table asks for the {} one",
+                asked.word()
+            )),
+            Some(_) if own != subject => {
+                Some(format!("the {word} body, as the table asks; the subject is {}", subject.word()))
+            }
+            None if own != subject => Some(format!("a {word} body; the subject is {}", subject.word())),
+            _ => None,
+        }
     }
 
     fn posed(&mut self, source: &Path, path: &Path, track: &PoseTrack) -> Result<Arc<RestBody>, Error> {
@@ -181,6 +223,11 @@ impl<'a> Models<'a> {
         if let Some((_, rest)) = shapes.iter().find(|(known, _)| *known == coefficients) {
             return Ok(rest.clone());
         }
+        let fit = ShapeFit {
+            file: source.to_owned(),
+            betas: betas.iter().rposition(|&beta| beta != 0.0).map_or(0, |last| last + 1),
+            directions: body.shape.as_ref().map_or(0, |own| own.directions.len()),
+        };
         let (mut rest, notes) = body::shape(body, betas, expression).map_err(|e| Error::scene(source, e))?;
         let offsets = self.subject.join("gt_normal_offset.npy");
         if self.options.clothing && offsets.is_file() {
@@ -190,6 +237,9 @@ impl<'a> Models<'a> {
         }
         let rest = Arc::new(rest);
         shapes.push((coefficients, rest.clone()));
+        if !self.shapes.contains(&fit) {
+            self.shapes.push(fit);
+        }
         notes.iter().for_each(|note| self.note(source, note));
         Ok(rest)
     }

@@ -125,9 +125,7 @@ impl Archive {
     }
 
     fn missing(&self, name: &str, expected: &str) -> Error {
-        // Names are whatever the archive says: one line in any case.
-        let names: Vec<String> = self.names().iter().map(|name| name.escape_debug().to_string()).collect();
-        self.invalid(name, format!("missing; the archive holds {}", names.join(", ")), expected)
+        Error::missing(&self.path, name, &self.names(), expected)
     }
 
     fn entry<T>(

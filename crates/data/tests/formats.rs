@@ -9,6 +9,10 @@ mod avatars;
 mod cameras_and_images;
 #[path = "../../../tests/support/files.rs"]
 mod files;
+#[path = "formats/gltf_builder.rs"]
+mod gltf_builder;
+#[path = "formats/gltf_dialects.rs"]
+mod gltf_dialects;
 #[path = "formats/gltf_files.rs"]
 mod gltf_files;
 #[path = "formats/pickles.rs"]

@@ -36,7 +36,7 @@ fn load(
     model: Option<PathBuf>,
     split: Option<&Split>,
 ) -> Result<Subject, Error> {
-    let options = Options { model, clothing: false };
+    let options = Options { model, ..Options::default() };
     (Layout::named(layout).unwrap().load)(&Request { folder, split, options: &options })
 }
 

@@ -10,20 +10,20 @@ pub enum Error {
     #[error(transparent)]
     Data(#[from] skinsplat_data::Error),
     /// A camera, pose or body that does not fit.
-    #[error("sequence {sequence}: {source}")]
+    #[error("sequence {sequence}: {problem}")]
     Scene {
         /// Id of the sequence.
         sequence: String,
-        /// What is wrong.
-        source: SceneError,
+        /// What is wrong; part of the message, so no source of its own.
+        problem: SceneError,
     },
     /// The avatar cannot be posed.
-    #[error("sequence {sequence}: {source}")]
+    #[error("sequence {sequence}: {problem}")]
     Strategy {
         /// Id of the sequence.
         sequence: String,
-        /// What is wrong.
-        source: PosingError,
+        /// What is wrong; part of the message, so no source of its own.
+        problem: PosingError,
     },
     /// An optimisation ran into numbers that are not finite.
     #[error(
@@ -70,10 +70,10 @@ impl Error {
     pub(super) fn strategy(
         sequence: &skinsplat_data::sequence::Sequence,
     ) -> impl Fn(PosingError) -> Self + '_ {
-        |source| Self::Strategy { sequence: sequence.id.clone(), source }
+        |problem| Self::Strategy { sequence: sequence.id.clone(), problem }
     }
 
     pub(super) fn scene(sequence: &skinsplat_data::sequence::Sequence) -> impl Fn(SceneError) -> Self + '_ {
-        |source| Self::Scene { sequence: sequence.id.clone(), source }
+        |problem| Self::Scene { sequence: sequence.id.clone(), problem }
     }
 }

@@ -11,6 +11,26 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+/// The arrays that are read of an SMPL-style `.npz` or `.pkl`.
+pub const ARRAYS: [&str; 16] = [
+    "v_template",
+    "f",
+    "faces",
+    "J",
+    "J_regressor",
+    "weights",
+    "kintree_table",
+    "joint_names",
+    "vt",
+    "ft",
+    "posedirs",
+    "shapedirs",
+    "hands_meanl",
+    "hands_meanr",
+    "hands_componentsl",
+    "hands_componentsr",
+];
+
 /// A body model, and what has to be said of how it was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {

@@ -20,6 +20,9 @@ pub struct CameraView {
     pub note: Option<String>,
 }
 
+/// The arrays that are read of a `cameras.npz`.
+pub const ARRAYS: [&str; 6] = ["intrinsic", "K", "extrinsic", "w2c", "width", "height"];
+
 /// Loads every camera of a file; the content tells the form.
 ///
 /// # Errors

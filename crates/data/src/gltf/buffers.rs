@@ -11,6 +11,15 @@ use skinsplat_core::scene::SceneError;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
+/// What integers of an accessor stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Integers {
+    /// Themselves, or fractions of the largest value of their type where the accessor is normalised.
+    AsSaid,
+    /// Fractions in any case.
+    Fractions,
+}
+
 /// A parsed document and the bytes that it refers to.
 pub(in super::super) struct Source {
     pub(super) document: Document,
@@ -165,11 +174,12 @@ impl Source {
             .ok_or_else(|| SceneError::new(field, "no data", "an accessor with a buffer view"))
     }
 
-    /// Vectors of floats or of integers, which stand for themselves, or for fractions where the accessor is normalised.
+    /// Vectors of floats or of integers, which stand for themselves or for fractions.
     pub(super) fn vectors<const N: usize>(
         &self,
         accessor: &Accessor,
         dimensions: Dimensions,
+        integers: Integers,
         field: &str,
     ) -> Result<Vec<[f64; N]>, SceneError>
     where
@@ -179,42 +189,8 @@ impl Source {
         [u16; N]: Item,
         [f32; N]: Item,
     {
-        let unit = |one: f64| if accessor.normalized() { one } else { 1.0 };
-        self.scaled(accessor, dimensions, field, unit)
-    }
-
-    /// As [`Source::vectors`], of attributes whose integers are fractions in any case.
-    pub(super) fn fractions<const N: usize>(
-        &self,
-        accessor: &Accessor,
-        dimensions: Dimensions,
-        field: &str,
-    ) -> Result<Vec<[f64; N]>, SceneError>
-    where
-        [i8; N]: Item,
-        [u8; N]: Item,
-        [i16; N]: Item,
-        [u16; N]: Item,
-        [f32; N]: Item,
-    {
-        self.scaled(accessor, dimensions, field, |one| one)
-    }
-
-    /// Integers over what `unit` makes of the largest value of their type.
-    fn scaled<const N: usize>(
-        &self,
-        accessor: &Accessor,
-        dimensions: Dimensions,
-        field: &str,
-        unit: impl Fn(f64) -> f64,
-    ) -> Result<Vec<[f64; N]>, SceneError>
-    where
-        [i8; N]: Item,
-        [u8; N]: Item,
-        [i16; N]: Item,
-        [u16; N]: Item,
-        [f32; N]: Item,
-    {
+        let fractions = integers == Integers::Fractions || accessor.normalized();
+        let unit = |one: f64| if fractions { one } else { 1.0 };
         fn over<T: Copy + Into<f64>, const N: usize>(rows: &[[T; N]], one: f64) -> Vec<[f64; N]> {
             // -128 and -32768 stand for -1 too.
             let least = if one == 1.0 { f64::MIN } else { -1.0 };

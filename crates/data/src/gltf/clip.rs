@@ -1,6 +1,6 @@
 //! Animations: channels with their own keys, sampled into poses.
 
-use super::buffers::Source;
+use super::buffers::{Integers, Source};
 use super::{Joints, Rig, unit};
 use crate::SourceDigest;
 use crate::digest::Fingerprint;
@@ -198,6 +198,6 @@ fn channel(source: &Source, channel: &GltfChannel, node: usize, field: &str) -> 
 
 /// Quaternions (x, y, z, w), as floats or normalised integers.
 fn rotations(source: &Source, accessor: &::gltf::Accessor, field: &str) -> Result<Vec<DVec4>, SceneError> {
-    let values = source.fractions::<4>(accessor, Dimensions::Vec4, field)?;
+    let values = source.vectors::<4>(accessor, Dimensions::Vec4, Integers::Fractions, field)?;
     Ok(values.into_iter().map(DVec4::from_array).collect())
 }

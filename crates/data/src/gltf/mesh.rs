@@ -1,7 +1,7 @@
 //! The skinned meshes of a glTF document as one mesh.
 
 use super::Joints;
-use super::buffers::Source;
+use super::buffers::{Integers, Source};
 use ::gltf::accessor::{DataType, Dimensions};
 use ::gltf::mesh::{Mode, Primitive};
 use ::gltf::{Accessor, Semantic, Skin};
@@ -71,7 +71,7 @@ impl Part<'_> {
         };
         Ok(self
             .source
-            .vectors::<3>(&accessor, Dimensions::Vec3, &field)?
+            .vectors::<3>(&accessor, Dimensions::Vec3, Integers::AsSaid, &field)?
             .into_iter()
             .map(DVec3::from)
             .collect())
@@ -111,7 +111,7 @@ impl Part<'_> {
     /// TEXCOORD_0 in OBJ convention (v up; glTF's runs down); none if the primitive has none.
     fn texture_coordinates(&self, vertices: usize) -> Result<Vec<[f32; 2]>, SceneError> {
         let Some((accessor, field)) = self.attribute(&Semantic::TexCoords(0)) else { return Ok(Vec::new()) };
-        let values = self.source.vectors::<2>(&accessor, Dimensions::Vec2, &field)?;
+        let values = self.source.vectors::<2>(&accessor, Dimensions::Vec2, Integers::AsSaid, &field)?;
         same_count(&field, values.len(), vertices)?;
         Ok(values.iter().map(|[u, v]| [*u as f32, 1.0 - *v as f32]).collect())
     }
@@ -146,7 +146,8 @@ impl Part<'_> {
                 }
                 _ => self.source.items(&joints, (DataType::U16, Dimensions::Vec4), &joints_field)?,
             };
-            let weights = self.source.fractions::<4>(&weights, Dimensions::Vec4, &weights_field)?;
+            let weights =
+                self.source.vectors::<4>(&weights, Dimensions::Vec4, Integers::Fractions, &weights_field)?;
             let weights: Vec<[f32; 4]> = weights.iter().map(|row| row.map(|w| w as f32)).collect();
             same_count(&joints_field, indices.len(), vertices)?;
             same_count(&weights_field, weights.len(), vertices)?;

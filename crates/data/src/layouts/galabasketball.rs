@@ -21,7 +21,7 @@
 //! Layout: `dataset/galaBasketball.py`, `deformer/gala_model.py` of Animatable-3D-Gaussian ee7318d.
 
 use super::unity;
-use super::{Layout, Request, split, surface};
+use super::{Layout, Part as Place, Request, split, surface};
 use crate::digest::Fingerprint;
 use crate::folder::Subject;
 use crate::{
@@ -36,6 +36,23 @@ use std::sync::Arc;
 pub(super) const LAYOUT: Layout = Layout {
     id: "galabasketball",
     summary: "GalaBasketball: model, pose, camera and bg of Unity's text files, a folder of images per camera",
+    parts: &[
+        Place::needed("mesh", "model/mesh.txt").telling(),
+        Place::needed("rest pose", "model/tpose.txt").telling(),
+        Place::needed("binding", "model/tpose_mat.txt").telling(),
+        Place::needed("parents", "model/jointParent.txt").telling(),
+        Place::needed("weights", "model/weights.npy").telling(),
+        Place::needed("poses", "pose/*.txt").telling(),
+        Place::needed("cameras", "camera/*.txt").telling(),
+        Place::needed("images of camera 0", "0/*.{png,jpg}"),
+        Place::needed("images of camera 1", "1/*.{png,jpg}"),
+        Place::needed("images of camera 2", "2/*.{png,jpg}"),
+        Place::needed("images of camera 3", "3/*.{png,jpg}"),
+        Place::needed("images of camera 4", "4/*.{png,jpg}"),
+        Place::needed("images of camera 5", "5/*.{png,jpg}"),
+        Place::needed("images of camera 6", "6/*.{png,jpg}"),
+        Place::optional("backgrounds", "bg/*.{png,jpg}"),
+    ],
     load,
 };
 

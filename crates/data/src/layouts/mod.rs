@@ -2,6 +2,7 @@
 
 mod aligned;
 mod colmap;
+mod contents;
 mod distortion;
 mod galabasketball;
 mod neuman;
@@ -13,11 +14,15 @@ mod unity;
 mod video;
 mod xhumans;
 
+pub use contents::{Contents, Found, Part, contents, subjects};
+
 use super::folder::{Options, Subject};
-use super::{Capture, Error, Sequence, listing};
+use super::{Capture, Error, FrameRef, Sequence, Sourced, listing};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+use skinsplat_core::scene::{Camera, Pose, RestBody};
 use std::path::Path;
+use std::sync::Arc;
 
 /// A layout that is read from files.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +31,8 @@ pub struct Layout {
     pub id: &'static str,
     /// What lies where, in a line.
     pub summary: &'static str,
+    /// What a subject's folder holds.
+    pub parts: &'static [Part],
     /// Reads a subject; no image is decoded.
     pub load: fn(&Request<'_>) -> Result<Subject, Error>,
 }
@@ -46,6 +53,7 @@ pub const LAYOUTS: &[Layout] = &[
     Layout {
         id: "folder",
         summary: "sequences train* and test*, each with transforms.json, or cameras.npz and poses.npz",
+        parts: &[],
         load: |request| Subject::load(request.folder, request.options),
     },
     peoplesnapshot::LAYOUT,
@@ -81,7 +89,23 @@ impl Request<'_> {
         test: Vec<Sequence>,
         notes: Vec<String>,
     ) -> Subject {
-        Subject { id: listing::file_name(self.folder), capture, train, test, notes }
+        Subject { id: listing::file_name(self.folder), capture, train, test, notes, shapes: Vec::new() }
+    }
+}
+
+/// What the sequences of a subject share.
+struct Shared {
+    body: Arc<RestBody>,
+    poses: Sourced<Vec<Pose>>,
+    cameras: Sourced<Vec<Camera>>,
+}
+
+impl Shared {
+    /// A sequence of these frames.
+    fn sequence(&self, id: &str, frames: Vec<FrameRef>) -> Sequence {
+        let Self { body, poses, cameras } = self;
+        let (body, poses, cameras) = (body.clone(), poses.clone(), cameras.clone());
+        Sequence { id: id.to_owned(), body, poses, cameras, frames, stored_sizes: None }
     }
 }
 

@@ -20,7 +20,7 @@
 
 use super::aligned;
 use super::colmap::{self, Registered};
-use super::{Layout, Request, split, triples};
+use super::{Layout, Part as Place, Request, Shared, split, triples};
 use crate::folder::Subject;
 use crate::models::{Family, Gender, Models};
 use crate::npz::Archive;
@@ -30,11 +30,20 @@ use crate::{
 };
 use skinsplat_core::scene::{Camera, Pose, RestBody};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 pub(super) const LAYOUT: Layout = Layout {
     id: "neuman",
     summary: "NeuMan: images, COLMAP's text model in sparse, segmentations or HUGS's 4d_humans, poses of either",
+    parts: &[
+        Place::needed("images", "images/*.{png,jpg,jpeg}"),
+        Place::needed("cameras", "sparse/cameras.txt").telling(),
+        Place::needed("registered images", "sparse/images.txt").telling(),
+        Place::needed("masks", "4d_humans/sam_segmentations/*.png").telling(),
+        Place::needed("masks", "segmentations/*.{npy,png}").telling(),
+        Place::needed("poses", "4d_humans/smpl_optimized_aligned_scale.npz").telling(),
+        Place::needed("poses", "smpl_output_optimized.pkl").telling(),
+        Place::optional("alignments", "alignments.npy").telling(),
+    ],
     load,
 };
 
@@ -66,10 +75,12 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
             "poses of smpl_output_optimized.pkl and alignments.npy: HUGS's 4d_humans is not here".into(),
         );
     }
-    let scene = Scene { folder, captures, masks, body, poses, cameras: cameras.into() };
+    let shared = Shared { body, poses, cameras: cameras.into() };
+    let scene = Scene { folder, captures, masks, shared };
     let sequences = [("train", train), ("test", test)].map(|(id, frames)| vec![scene.sequence(id, &frames)]);
     let [train, test] = sequences;
-    Ok(request.subject(Capture::Monocular, train, test, notes))
+    let shapes = models.shapes().to_vec();
+    Ok(Subject { shapes, ..request.subject(Capture::Monocular, train, test, notes) })
 }
 
 /// Shapes and poses of all frames.
@@ -98,9 +109,7 @@ struct Scene<'a> {
     folder: &'a Path,
     captures: Vec<Registered>,
     masks: Vec<MaskFile>,
-    body: Arc<RestBody>,
-    poses: Sourced<Vec<Pose>>,
-    cameras: Sourced<Vec<Camera>>,
+    shared: Shared,
 }
 
 impl Scene<'_> {
@@ -120,14 +129,7 @@ impl Scene<'_> {
                 background: None,
             }),
         };
-        Sequence {
-            id: id.to_owned(),
-            body: self.body.clone(),
-            poses: self.poses.clone(),
-            cameras: self.cameras.clone(),
-            frames: frames.iter().map(frame).collect(),
-            stored_sizes: None,
-        }
+        self.shared.sequence(id, frames.iter().map(frame).collect())
     }
 }
 

@@ -17,7 +17,7 @@
 
 use super::split::{self, Config, Range, Splits};
 use super::video::Numbered;
-use super::{Layout, Request};
+use super::{Layout, Part as Place, Request};
 use crate::folder::Subject;
 use crate::models::{Family, Gender, Models};
 use crate::poses::{self, PoseTrack};
@@ -28,6 +28,15 @@ use std::path::{Path, PathBuf};
 pub(super) const LAYOUT: Layout = Layout {
     id: "peoplesnapshot",
     summary: "PeopleSnapshot as prepared for InstantAvatar: cameras.npz, images, masks, poses.npz or refined poses",
+    parts: &[
+        Place::needed("images", "images/*.{png,jpg,jpeg}"),
+        Place::needed("masks", "masks/*.{npy,png}"),
+        Place::needed("cameras", "cameras.npz").telling(),
+        Place::needed("poses", "poses.npz").telling(),
+        Place::needed("poses", "poses/anim_nerf_train.npz").telling(),
+        Place::optional("poses of the test frames", "poses/anim_nerf_test.npz").telling(),
+        Place::optional("gender and ranges", "config.json"),
+    ],
     load,
 };
 
@@ -44,7 +53,8 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let mut sequence = |id: &str| video.sequence(id, &splits.ranges(id), gender, &mut models);
     let (train, test) = (vec![sequence("train")?], vec![sequence("test")?]);
     notes.extend_from_slice(models.notes());
-    Ok(request.subject(Capture::Monocular, train, test, notes))
+    let shapes = models.shapes().to_vec();
+    Ok(Subject { shapes, ..request.subject(Capture::Monocular, train, test, notes) })
 }
 
 /// The subject's gender: as `config.json` says, else as its folder's name does; neutral with a note if neither does.

@@ -19,7 +19,7 @@ use super::distortion::Distortion;
 use super::peoplesnapshot::gender;
 use super::split::{self, Splits};
 use super::video::Numbered;
-use super::{Layout, Request, triples};
+use super::{Layout, Part as Place, Request, Shared, triples};
 use crate::digest::Fingerprint;
 use crate::folder::Subject;
 use crate::hdf5::{Hdf5, Rows};
@@ -38,6 +38,15 @@ use std::sync::Arc;
 pub(super) const LAYOUT: Layout = Layout {
     id: "peoplesnapshot-raw",
     summary: "PeopleSnapshot as distributed: camera.pkl, masks.hdf5, reconstructed_poses.hdf5, consensus.pkl, extracted frames",
+    parts: &[
+        Place::needed("frames", "frames/*.{png,jpg,jpeg}"),
+        Place::needed("frames", "images/*.{png,jpg,jpeg}"),
+        Place::optional("video", "*.{mp4,avi,mov}"),
+        Place::needed("masks", "masks.hdf5").telling(),
+        Place::needed("camera", "camera.pkl").telling(),
+        Place::needed("poses", "reconstructed_poses.hdf5").telling(),
+        Place::optional("clothed shape", "consensus.pkl").telling(),
+    ],
     load,
 };
 
@@ -60,10 +69,12 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
         notes.push("frames and masks are undistorted with camera_k".to_owned());
     }
     notes.extend_from_slice(models.notes());
-    let video = Video { folder, images, masks: Arc::new(masks), camera, distortion, body, poses };
+    let shared = Shared { body, poses, cameras: vec![camera.clone()].into() };
+    let video = Video { folder, images, masks: Arc::new(masks), camera, distortion, shared };
     let sequence = |part: &str| Ok::<_, Error>(vec![video.sequence(part, splits.ranges(part)[0])?]);
     let (train, test) = (sequence("train")?, sequence("test")?);
-    Ok(request.subject(Capture::Monocular, train, test, notes))
+    let shapes = models.shapes().to_vec();
+    Ok(Subject { shapes, ..request.subject(Capture::Monocular, train, test, notes) })
 }
 
 /// What both sequences are cut from.
@@ -73,8 +84,7 @@ struct Video<'a> {
     masks: Arc<Rows>,
     camera: Camera,
     distortion: Distortion,
-    body: Arc<RestBody>,
-    poses: Sourced<Vec<Pose>>,
+    shared: Shared,
 }
 
 impl Video<'_> {
@@ -89,14 +99,7 @@ impl Video<'_> {
             Ok(FrameRef { name, time, pose: time, camera: 0, source })
         };
         let chosen = split::chosen(self.folder, id, range, self.masks.shape()[0])?;
-        Ok(Sequence {
-            id: id.to_owned(),
-            body: self.body.clone(),
-            poses: self.poses.clone(),
-            cameras: vec![self.camera.clone()].into(),
-            frames: chosen.into_iter().map(frame).collect::<Result<_, Error>>()?,
-            stored_sizes: None,
-        })
+        Ok(self.shared.sequence(id, chosen.into_iter().map(frame).collect::<Result<_, Error>>()?))
     }
 }
 

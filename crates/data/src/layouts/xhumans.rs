@@ -21,7 +21,7 @@
 //! Layout: `data_process/README.md` of X-Avatar 7a071b6, `dataloaders/xhuman_loader.py` and `runners/train_gaussians.py` of HAHA
 //! 2ffefe2.
 
-use super::{Layout, Request};
+use super::{Layout, Part as Place, Request};
 use crate::digest::Fingerprint;
 use crate::folder::Subject;
 use crate::models::{Family, Gender, Models};
@@ -41,6 +41,18 @@ use std::sync::Arc;
 pub(super) const LAYOUT: Layout = Layout {
     id: "xhumans",
     summary: "X-Humans: gender.txt, mean_shape_smplx.npy, takes in train and test with render/ and SMPLX/",
+    parts: &[
+        Place::needed("gender", "gender.txt").telling(),
+        Place::needed("shape", "mean_shape_smplx.npy").telling(),
+        Place::needed("training images", "train/*/render/image/*.{png,jpg,jpeg}").telling(),
+        Place::needed("training depth", "train/*/render/depth/depth_*.tiff").telling(),
+        Place::needed("training cameras", "train/*/render/cameras.npz").telling(),
+        Place::needed("training poses", "train/*/SMPLX/mesh-f*_smplx.pkl").telling(),
+        Place::optional("test images", "test/*/render/image/*.{png,jpg,jpeg}").telling(),
+        Place::optional("test depth", "test/*/render/depth/depth_*.tiff").telling(),
+        Place::optional("test cameras", "test/*/render/cameras.npz").telling(),
+        Place::optional("test poses", "test/*/SMPLX/mesh-f*_smplx.pkl").telling(),
+    ],
     load,
 };
 
@@ -86,7 +98,8 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     if person.expressive > 0 {
         notes.push(format!("expressions are left out ({} frames have one)", person.expressive));
     }
-    Ok(request.subject(Capture::Hands, train, test, notes))
+    let shapes = person.models.shapes().to_vec();
+    Ok(Subject { shapes, ..request.subject(Capture::Hands, train, test, notes) })
 }
 
 fn betas(path: &Path) -> Result<Vec<f64>, Error> {

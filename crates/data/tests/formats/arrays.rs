@@ -137,6 +137,6 @@ fn archives_check_shapes_against_each_other() {
     assert!(error.ends_with("b: shape [2, 4]; expected (N,3) with N = 2"), "{error}");
     assert_eq!(archive.require("c", "3").unwrap_err().field(), "c[1]");
     let error = archive.require("d", "3").unwrap_err().to_string();
-    assert!(error.contains("d: missing; the archive holds a, b, c"), "{error}");
+    assert!(error.contains("d: missing; the file holds a, b, c"), "{error}");
     assert!(archive.optional("d", "3").unwrap().is_none());
 }

@@ -1,0 +1,62 @@
+//! Whether pictures were taken through a lens that the cameras do not know of.
+//!
+//! Cameras here are pinholes. Where pictures still have their lens distortion, or were undistorted twice, silhouettes fit once
+//! the masks are bent about the principal point: a point at distance r moves to `s r (1 + k r^2 / R^2)`, with R half the
+//! image's diagonal. A better overlap than any size s alone gives is a lens. Loose clothes and wrong focal lengths are sizes.
+
+use super::findings::mean;
+use super::{Finding, Kind, Seen, Shadows};
+use skinsplat_core::scene::Camera;
+use skinsplat_data::Sequence;
+
+/// By how much the overlap must be better than without a lens.
+const BETTER: f64 = 0.03;
+/// Frames that are compared, at most.
+const MOST: usize = 12;
+/// Coefficients k that are tried: below zero straight lines bulge outwards, as most lenses have it.
+const LENSES: [f64; 8] = [-0.16, -0.12, -0.08, -0.05, 0.05, 0.08, 0.12, 0.16];
+/// Sizes s that are tried.
+const SIZES: [f64; 9] = [0.84, 0.88, 0.92, 0.96, 1.0, 1.04, 1.08, 1.12, 1.16];
+
+/// A finding if masks fit better through a lens.
+pub(super) fn bent(sequence: &Sequence, both: &[(&Seen, &Shadows)]) -> Option<Finding> {
+    let step = both.len().div_ceil(MOST).max(1);
+    let frames: Vec<&(&Seen, &Shadows)> = both.iter().step_by(step).collect();
+    let overlap = |k: f64, size: f64| {
+        mean(frames.iter().filter_map(|(seen, shadows)| through(shadows, &seen.camera, k, size)))
+    };
+    let best = |k: f64| SIZES.iter().filter_map(|&size| overlap(k, size)).max_by(f64::total_cmp);
+    let plain = best(0.0)?;
+    let fits = LENSES.iter().filter_map(|&k| Some((k, best(k)?)));
+    let (k, fit) = fits.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    if fit < plain + BETTER {
+        return None;
+    }
+    let (percent, what) = (100.0 * k.abs(), if k < 0.0 { "not undistorted" } else { "undistorted twice" });
+    let detail = format!(
+        "body and masks overlap by {fit:.2} for {plain:.2} through a lens that moves corners by {percent:.0} %: {what}?"
+    );
+    Some(Finding::new(Kind::Camera, &sequence.id, detail))
+}
+
+/// Overlap of the body with a mask seen through a lens, over the pixels that the lens leaves in the image; none if there is
+/// nothing to overlap.
+fn through(Shadows { mask, body, .. }: &Shadows, camera: &Camera, k: f64, size: f64) -> Option<f64> {
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let corner = 0.25 * (width * width + height * height);
+    let (mut common, mut either) = (0_u32, 0_u32);
+    for y in 0..body.height {
+        for x in 0..body.width {
+            let (u, v) = (x as f64 + 0.5 - camera.cx, y as f64 + 0.5 - camera.cy);
+            let factor = size * (1.0 + k * (u * u + v * v) / corner);
+            let (u, v) = (camera.cx + factor * u, camera.cy + factor * v);
+            if !(0.0..width).contains(&u) || !(0.0..height).contains(&v) {
+                continue;
+            }
+            let (a, b) = (body.at(x, y), mask.at(u as usize, v as usize));
+            common += u32::from(a && b);
+            either += u32::from(a || b);
+        }
+    }
+    (either > 0).then(|| f64::from(common) / f64::from(either))
+}

@@ -1,0 +1,95 @@
+//! What a folder holds: an export of an avatar, a subject in one of the layouts, renders of another program, or folders of them.
+
+use super::{avatar_text, line, notes_text};
+use anyhow::{Result, bail};
+use skinsplat::run::renders::{self, RenderFolder};
+use skinsplat_core::scene::Camera;
+use skinsplat_data::avatar::read_avatar;
+use skinsplat_data::folder::{Options, is_subject};
+use skinsplat_data::layouts::{self, Contents, Request};
+use skinsplat_data::{FrameSource, Sequence, Subject, splatting_avatar};
+use std::path::Path;
+
+/// Everything of a folder.
+pub(super) fn text(path: &Path) -> Result<String> {
+    if path.join(splatting_avatar::GAUSSIANS).is_file() || path.join("point_cloud").is_dir() {
+        return Ok(avatar_text(&read_avatar(path)?));
+    }
+    if let Some(contents) = layouts::contents(path) {
+        return subject_text(path, &contents);
+    }
+    let inner = path.join("datasets");
+    let parent = if inner.is_dir() { &inner } else { path };
+    let subjects = layouts::subjects(parent);
+    if !subjects.is_empty() {
+        let mut text = line("kind", "folder of subjects");
+        for (folder, contents) in subjects {
+            text += &subject_text(&folder, &contents)?;
+        }
+        return Ok(text);
+    }
+    if let Some(folder) = renders::look(path)? {
+        return Ok(renders_text(&folder));
+    }
+    let known: Vec<&str> = layouts::LAYOUTS.iter().map(|layout| layout.id).collect();
+    let expected = "an avatar's export, a subject or a folder of subjects (layouts";
+    bail!(
+        "{}: folder: nothing that is known; expected {expected} {}), or images",
+        path.display(),
+        known.join(", ")
+    )
+}
+
+/// A subject: what lies there, what is missing, and what is read of it.
+fn subject_text(path: &Path, contents: &Contents) -> Result<String> {
+    let mut text =
+        line("kind", format!("subject, layout {}: {}", contents.layout.id, contents.layout.summary));
+    for found in &contents.found {
+        let files = if found.files == 1 { "1 file".to_owned() } else { format!("{} files", found.files) };
+        text += &line(found.part.what, format!("{files}: {}", found.part.place));
+    }
+    text += &contents.missing.iter().map(|missing| line("missing", missing)).collect::<String>();
+    let request = Request { folder: path, split: None, options: &Options::default() };
+    Ok(match (contents.layout.load)(&request) {
+        Ok(subject) => text + &loaded_text(&subject),
+        // A folder of this project's own is right or wrong; somebody else's may be half unpacked.
+        Err(error) if is_subject(path) => return Err(error.into()),
+        Err(error) => text + &line("not read", error),
+    })
+}
+
+fn loaded_text(subject: &Subject) -> String {
+    let mut text =
+        line("subject", &subject.id) + &line("capture", format!("{:?}", subject.capture).to_lowercase());
+    if let Some(sequence) = subject.sequences().next() {
+        let body = &sequence.body;
+        let (vertices, joints) = (body.vertices.len(), body.skeleton.num_joints());
+        text += &line("body model", format!("{vertices} vertices, {joints} joints"));
+    }
+    text += &subject.sequences().map(sequence_text).collect::<String>();
+    text + &notes_text(&subject.notes)
+}
+
+fn sequence_text(sequence: &Sequence) -> String {
+    let (frames, poses, cameras) = (sequence.frames.len(), sequence.poses.len(), sequence.cameras.len());
+    let masked = |source: &FrameSource| match source {
+        FrameSource::Files(files) => files.mask.is_some(),
+        FrameSource::Generated { .. } => true,
+    };
+    let masks = sequence.frames.iter().filter(|frame| masked(&frame.source)).count();
+    let size = |camera: &Camera| format!(", images of {}x{}", camera.width, camera.height);
+    let size = sequence.cameras.first().map_or(String::new(), size);
+    line(&sequence.id, format!("{frames} frames, {poses} poses, {cameras} cameras, {masks} masks{size}"))
+}
+
+fn renders_text(RenderFolder { frames, size, said }: &RenderFolder) -> String {
+    let mut text = line("kind", "images: renders of another program, for --renders VARIANT=FOLDER");
+    let (first, last) = (frames.first(), frames.last());
+    let ends = first.zip(last).map_or(String::new(), |(first, last)| format!(", {first} to {last}"));
+    text += &line("frames", format!("{}{ends}", frames.len()));
+    if let Some([width, height]) = size {
+        text += &line("size of the first", format!("{width}x{height}"));
+    }
+    text += &said.iter().map(|(name, value)| line(name, value)).collect::<String>();
+    text
+}
