@@ -41,11 +41,9 @@ pub struct SurfaceInit {
     /// How far below the surface the Gaussians sit, in pixels of the training frames: a splat renderer widens every
     /// outline by its low-pass filter. Thin parts sink less; what no frame shows (inside the mouth) stays.
     pub inset: f64,
-    /// Gaussians drawn from the surface, evenly by area and as large as their share of it; none: all that `placement` has.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub samples: Option<u32>,
+    /// Gaussians drawn from the surface, evenly by area and as large as their share of it; 0: all that `placement` has.
+    pub samples: u32,
     /// What they look like.
-    #[serde(skip_serializing_if = "StartShape::is_disc")]
     pub shape: StartShape,
     /// SH degree of the colours, 0 to 3.
     pub sh_degree: usize,
@@ -72,7 +70,7 @@ impl Default for SurfaceInit {
             thickness: 0.1,
             opacity: 0.99,
             inset: 1.2,
-            samples: None,
+            samples: 0,
             shape: StartShape::Disc,
             sh_degree: 0,
             smoothness: 0.1,
@@ -94,11 +92,11 @@ pub fn surface_init(sequence: &Sequence, init: &SurfaceInit) -> Result<Avatar, E
     let dressed = clothing::dressed(&training, &init.clothing, &init.sighting)?;
     let (layout, mut colours) = coloured(&dressed, init)?;
     refine(&dressed, &layout, init, &mut colours)?;
-    let (layout, colours) = match init.samples {
-        Some(n) => layout
-            .sampled(&colours, n as usize, sequence.body.skeleton.num_joints())
+    let (layout, colours) = match init.samples as usize {
+        0 => (layout, colours),
+        n => layout
+            .sampled(&colours, n, sequence.body.skeleton.num_joints())
             .map_err(Error::scene(sequence))?,
-        None => (layout, colours),
     };
     Ok(layout.avatar(init, &colours, &sequence.body))
 }

@@ -147,11 +147,11 @@ pub struct Start {
     pub opacity: f64,
     /// How far below the surface, in pixels of the training frames.
     pub inset: f64,
-    /// Gaussians drawn from the surface, evenly by area and as large as their share of it; none: all that `placement` has.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub samples: Option<u32>,
+    /// Gaussians drawn from the surface, evenly by area and as large as their share of it; 0: all that `placement` has.
+    #[serde(default)]
+    pub samples: u32,
     /// What they look like.
-    #[serde(default, skip_serializing_if = "StartShape::is_disc")]
+    #[serde(default)]
     pub shape: StartShape,
 }
 
@@ -164,12 +164,6 @@ pub enum StartShape {
     Disc,
     /// As wide across the surface as along it, at the identity: 3DGS, Animatable 3D Gaussians.
     Ball,
-}
-
-impl StartShape {
-    pub(crate) fn is_disc(&self) -> bool {
-        *self == Self::Disc
-    }
 }
 
 /// What is fitted. Colours always are.
@@ -414,9 +408,6 @@ impl Recipe {
         }
         if start.opacity >= 1.0 {
             return refuse("start.opacity", start.opacity.to_string(), "below 1");
-        }
-        if start.samples == Some(0) {
-            return refuse("start.samples", "0".to_owned(), "1 or more Gaussians");
         }
         if !start.inset.is_finite() {
             return refuse("start.inset", start.inset.to_string(), "a finite number of pixels");
