@@ -37,7 +37,7 @@ const DEGENERATE: f64 = 1e-10;
 /// A posed normal shorter than this (relative to the product of the tangents' sizes) has no direction.
 const FOLDED: f32 = 1e-12;
 
-/// What [`jacobian`] reads besides blocks, for the blocks of one chunk. Empty vectors for Gaussians that do not move.
+/// What [`Derivative`] reads besides blocks, for the blocks of one chunk. Empty vectors for Gaussians that do not move.
 #[derive(Clone, Debug)]
 pub(super) struct Tangents {
     /// ∇w_j, 1/m, a row per joint of [`Chunk::weights`].
