@@ -107,7 +107,7 @@ pub(super) fn unquoted(line: &[u8]) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Text of protocol 0: Latin-1 with `\uXXXX` and `\UXXXXXXXX`.
+/// Text of protocol 0: Latin-1, other characters by their numbers in 4 or 8 hexadecimal digits.
 pub(super) fn raw_unicode(line: &[u8]) -> Option<String> {
     let mut text = String::with_capacity(line.len());
     let mut at = 0;
