@@ -18,10 +18,9 @@
 //! pixel centres at +0.5.
 //!
 //! # Layers
-//! The harness's modules, lowest first: [`check`] → [`datasets`] → [`experiment`] → [`run`] → [`report`]; `tests/architecture.rs`
+//! The harness's modules, lowest first: [`datasets`] → [`experiment`] → [`run`] → [`report`]; `tests/architecture.rs`
 //! reads the imports. They stand on crates of their own, which anybody may use alone: ARCHITECTURE.md draws them.
 
-pub mod check;
 pub mod datasets;
 pub mod experiment;
 pub mod report;

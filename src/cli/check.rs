@@ -5,7 +5,7 @@ use super::output::{Format, emit, emit_json};
 use super::{Context, Exit};
 use anyhow::Result;
 use serde::Serialize;
-use skinsplat::check::{self, Finding, SequenceFit};
+use skinsplat_check::{self as check, Finding, SequenceFit};
 use skinsplat_data::select::evenly_spaced;
 use std::path::PathBuf;
 

@@ -128,6 +128,7 @@ impl Run {
         let results = report::results(&planned.plan, &planned.experiments, &records)?;
         write_results(&self.out, &results)?;
         self.write_curves(planned)?;
+        self.write_bend(&results)?;
         write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
         if self.images {
             self.write_images(planned, &records, context)?;
@@ -174,6 +175,16 @@ impl Run {
         make_folder(&folder)?;
         for (name, svg) in report::curve_plots(&curves, experiments)? {
             write_text(&folder.join(format!("{name}.svg")), &svg)?;
+        }
+        Ok(())
+    }
+
+    /// Differences by how far the body is bent, if a table asks for them.
+    fn write_bend(&self, results: &report::Results) -> Result<()> {
+        let Some(lines) = report::bend_csv(results) else { return Ok(()) };
+        write_text(&self.out.join("bend.csv"), &lines)?;
+        for (table, svg) in report::bend_plots(results)? {
+            write_text(&self.out.join(format!("{table}-bend.svg")), &svg)?;
         }
         Ok(())
     }

@@ -14,6 +14,7 @@ mod dataset;
 mod embedded;
 mod equivalence;
 mod error;
+mod grid;
 mod paper;
 mod plan;
 mod profile;
@@ -31,6 +32,7 @@ pub use dataset::{
 };
 pub use embedded::{EMBEDDED, FURTHER};
 pub use error::Error;
+pub use grid::Grid;
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
 pub use plan::{Job, JobVariant, Plan, PlannedTable, plan};
 pub use profile::{GivenWeights, Options, Profile, Subset};

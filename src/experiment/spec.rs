@@ -1,6 +1,8 @@
 //! The experiment file: one table, described as data.
 
-use super::{EMBEDDED, Error, FURTHER, Paper, Profile, Replicate, Source, Split, catalog, seeds, validate};
+use super::{
+    EMBEDDED, Error, FURTHER, Grid, Paper, Profile, Replicate, Source, Split, catalog, grid, seeds, validate,
+};
 use serde::{Deserialize, Serialize};
 use skinsplat_data::{Capture, Gender};
 use skinsplat_metrics::MetricId;
@@ -73,7 +75,11 @@ pub struct Experiment {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub equivalence: BTreeMap<MetricId, f64>,
     /// What is compared, once per seed where there are several.
+    #[serde(default)]
     pub variants: Vec<Variant>,
+    /// Further variants, by the product of their choices; empty once they are among `variants`.
+    #[serde(default, skip_serializing)]
+    pub grids: Vec<Grid>,
     /// The printed table, if there is one.
     pub paper: Option<Paper>,
     /// How the compared method's repository splits the data.
@@ -302,6 +308,7 @@ impl Experiment {
     /// Names the file and the line or key.
     pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
         let experiment: Self = toml::from_str(text).map_err(|error| toml_error(text, file, &error))?;
+        let experiment = grid::expand(experiment, file)?;
         validate::experiment(&experiment, file)?;
         Ok(seeds::expand(experiment))
     }

@@ -10,6 +10,7 @@
 //! A [`Table`](skinsplat_table::Table) is the one value that every format prints. Missing frames are counted and named, a metric that was not
 //! computed is "n/c" and never 0, and bold is the best value of a sequence with everything that is not decided to be worse.
 
+mod bend;
 mod best;
 mod build;
 mod captions;
@@ -27,6 +28,7 @@ mod results;
 
 pub use collect::results;
 pub use comparison::{Comparison, MetricDifference};
+pub use bend::{bend_csv, bend_plots};
 pub use curves::{curve_plots, curves_csv};
 pub use markdown::markdown;
 pub use page::page;

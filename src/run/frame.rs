@@ -5,12 +5,17 @@ use super::drawable::{Behind, Drawable, Drawn, Look, PosedView, Scratch};
 use skinsplat_core::scene::PosedBody;
 use skinsplat_data::{FrameSource, Sequence, Truth};
 use skinsplat_metrics::{AvatarStats, FrameScore, Protocol, Wanted};
+use skinsplat_posing::face_spreads;
+use skinsplat_render::mesh::{Mesh, visible_faces};
+use std::sync::OnceLock;
 use std::time::Instant;
 
 /// A frame, loaded.
 pub(super) struct Frame<'a> {
     pub(super) truth: Truth,
     pub(super) view: PosedView<'a>,
+    /// [`Wanted::bend`], once somebody asks.
+    bend: OnceLock<Vec<f32>>,
 }
 
 /// What came of a drawing and its comparison with the truth.
@@ -38,7 +43,8 @@ impl<'a> Frame<'a> {
             None => PosedBody::new(&sequence.body, pose)?,
         };
         let (name, stored) = (frame.name.as_str(), sequence.stored_size(frame.camera));
-        Ok(Self { truth, view: PosedView { pose, camera, body, name, stored } })
+        let view = PosedView { pose, camera, body, name, stored };
+        Ok(Self { truth, view, bend: OnceLock::new() })
     }
 
     /// Draws the frame and scores the drawing.
@@ -54,11 +60,31 @@ impl<'a> Frame<'a> {
         scratch: &mut Scratch,
     ) -> Result<Scored, Error> {
         let drawn = drawable.draw(&self.view, look, scratch)?;
+        let bend = match wanted.metrics.iter().any(|metric| metric.needs_bend()) {
+            true => Some(self.bend()?),
+            false => None,
+        };
         let start = Instant::now();
         let truth = skinsplat_metrics::Truth::Straight { rgb: &self.truth.rgb, alpha: &self.truth.alpha };
-        let wanted = Wanted { avatar: AvatarStats { gaussians: drawn.splats }, ..wanted };
+        let wanted = Wanted { avatar: AvatarStats { gaussians: drawn.splats }, bend, ..wanted };
         let score = protocol.score_with(&drawn.image, truth, wanted)?;
         Ok(Scored { score, drawn, score_seconds: start.elapsed().as_secs_f64() })
+    }
+
+    /// By how much the body is bent where each pixel shows it, degrees; -1 where there is no body. It is the same for every
+    /// avatar and strategy, so that they are compared on the same pixels. The frame must know all joints' rotations.
+    fn bend(&self) -> Result<&[f32], Error> {
+        if let Some(bend) = self.bend.get() {
+            return Ok(bend);
+        }
+        let body = &self.view.body;
+        let spreads = face_spreads(body);
+        let mesh = Mesh::new(&body.mesh().vertices, &body.rest.faces)?;
+        let seen = visible_faces(&mesh, self.view.camera)?;
+        let at = |i: usize| seen.face(i % seen.width(), i / seen.width());
+        let pixels = 0..seen.width() * seen.height();
+        let bend = pixels.map(|i| at(i).map_or(-1.0, |face| spreads[face as usize])).collect();
+        Ok(self.bend.get_or_init(|| bend))
     }
 }
 

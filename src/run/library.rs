@@ -2,7 +2,6 @@
 
 use super::drawable::Drawable;
 use super::{Error, renders};
-use crate::check;
 use crate::experiment::{
     AvatarFile, AvatarState, Dataset, FrameInfo, Role, SequenceInfo, SubjectInfo, Unreadable,
 };
@@ -132,7 +131,7 @@ fn describe_subject(
     let renders = renders.collect::<Result<_, _>>()?;
     let split_given = dataset.splits_given.contains(&subject.id);
     let mut notes = subject.notes.clone();
-    notes.extend(check::subject(subject).iter().map(|found| format!("check finds {}", found.kind)));
+    notes.extend(skinsplat_check::subject(subject).iter().map(|found| format!("check finds {}", found.kind)));
     notes.extend(subject.sequences().flat_map(misfits));
     let (id, capture) = (subject.id.clone(), subject.capture);
     Ok(SubjectInfo { id, capture, sequences, split_given, notes, avatars, renders })
@@ -148,7 +147,7 @@ fn misfits(sequence: &Sequence) -> Vec<String> {
         return Vec::new();
     }
     let all: Vec<usize> = (0..sequence.frames.len()).collect();
-    let (_, findings) = check::sequence(sequence, &evenly_spaced(&all, Some(LOOKS)));
+    let (_, findings) = skinsplat_check::sequence(sequence, &evenly_spaced(&all, Some(LOOKS)));
     findings.iter().map(|found| format!("check finds {} in {}", found.kind, sequence.id)).collect()
 }
 

@@ -75,7 +75,7 @@ impl Protocol {
                     let values = frames.iter().filter_map(|frame| frame.value(id));
                     summary.values.insert(id, values.fold(f64::NEG_INFINITY, f64::max));
                 }
-                Measure::Frame { over_frames, .. } => match mean_of_frames(frames, id) {
+                Measure::Frame { over_frames, .. } => match mean_of_frames(frames, id, over_frames) {
                     Ok(mean) => summary.insert(id, mean, over_frames, self, channel_mse),
                     Err(reason) => drop(summary.not_computed.insert(id, reason)),
                 },
@@ -142,9 +142,13 @@ fn scored_by(frames: &[FrameScore]) -> BTreeSet<MetricId> {
 }
 
 /// The mean of a metric, or why there is none.
-fn mean_of_frames(frames: &[FrameScore], id: MetricId) -> Result<f64, String> {
-    let sum: Option<f64> = frames.iter().map(|frame| frame.value(id)).sum();
-    sum.map(|sum| sum / frames.len() as f64).ok_or_else(|| {
+fn mean_of_frames(frames: &[FrameScore], id: MetricId, over_frames: OverFrames) -> Result<f64, String> {
+    let values: Vec<f64> = frames.iter().filter_map(|frame| frame.value(id)).collect();
+    let enough = match over_frames {
+        OverFrames::MeanWhereThere => !values.is_empty(),
+        OverFrames::Mean | OverFrames::Pooled(_) => values.len() == frames.len(),
+    };
+    enough.then(|| values.iter().sum::<f64>() / values.len() as f64).ok_or_else(|| {
         let reason = frames.iter().find_map(|frame| frame.not_computed.get(&id));
         reason.cloned().unwrap_or_else(|| "not asked for in every frame".to_owned())
     })

@@ -51,6 +51,22 @@ pub enum MetricsError {
         /// What was expected.
         expected: String,
     },
+    /// A metric of bent pixels, and nobody said how the body is bent.
+    NoBend,
+    /// The body shows too few pixels that are bent so far.
+    FewBentPixels {
+        /// Pixels.
+        pixels: usize,
+        /// Fewest of which the metric is taken.
+        least: usize,
+    },
+    /// Angles of another image.
+    BendSize {
+        /// Values given.
+        values: usize,
+        /// Pixels of the images.
+        pixels: usize,
+    },
     /// A region needs a mask and none was given.
     NoMask {
         /// The region.
@@ -133,6 +149,13 @@ impl fmt::Display for MetricsError {
                 format!("the scored image has {width}x{height} pixels"),
                 format!("at least {minimum}x{minimum}"),
             ),
+            Self::NoBend => ("bend", "none given".into(), "a body whose joints are known".into()),
+            Self::FewBentPixels { pixels, least } => {
+                ("bend", format!("{pixels} pixels of the body are bent so far"), format!("at least {least}"))
+            }
+            Self::BendSize { values, pixels } => {
+                ("bend", format!("{values} values"), format!("one per pixel, {pixels}"))
+            }
             Self::NoMask { region } => ("mask", "none given".into(), format!("one, for region \"{region}\"")),
             Self::EmptyRegion { region, threshold, largest } => (
                 "mask",

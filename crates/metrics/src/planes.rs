@@ -86,10 +86,7 @@ impl Planes {
 
     /// The part inside a rectangle that lies within the image.
     pub(crate) fn crop(&self, rect: &Rect) -> Self {
-        let cut = |plane: &Vec<f64>| {
-            let row = |y: usize| &plane[y * self.width + rect.x.start..y * self.width + rect.x.end];
-            rect.y.clone().flat_map(row).copied().collect()
-        };
+        let cut = |plane: &Vec<f64>| rect.cut(plane, self.width);
         let channels = [cut(&self.channels[0]), cut(&self.channels[1]), cut(&self.channels[2])];
         Self { width: rect.x.len(), height: rect.y.len(), channels }
     }

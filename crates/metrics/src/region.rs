@@ -63,6 +63,14 @@ pub(crate) struct Rect {
     pub(crate) y: Range<usize>,
 }
 
+impl Rect {
+    /// The values of a plane of this width that lie inside.
+    pub(crate) fn cut<T: Copy>(&self, plane: &[T], width: usize) -> Vec<T> {
+        let row = |y: usize| &plane[y * width + self.x.start..y * width + self.x.end];
+        self.y.clone().flat_map(row).copied().collect()
+    }
+}
+
 /// From the first to the last row and column that hold a mask value of `threshold` or more. `None` if no pixel does or
 /// if leaving out the last row and column (`exclusive`) leaves nothing.
 pub(crate) fn bounding_box(mask: &Mask, threshold: f32, exclusive: bool) -> Option<Rect> {

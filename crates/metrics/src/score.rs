@@ -91,12 +91,15 @@ pub struct Wanted<'a> {
     pub lpips: Option<&'a dyn PerceptualDistance>,
     /// The avatar that was drawn, for metrics of it.
     pub avatar: AvatarStats,
+    /// By how much the body is bent where a pixel shows it: the widest angle between the joints that move the surface there,
+    /// degrees, row by row; negative where there is no body. Metrics of bent pixels need it.
+    pub bend: Option<&'a [f32]>,
 }
 
 impl<'a> Wanted<'a> {
     /// Metrics of two images, without LPIPS.
     pub fn of(metrics: &'a [MetricId]) -> Self {
-        Self { metrics, lpips: None, avatar: AvatarStats::default() }
+        Self { metrics, lpips: None, avatar: AvatarStats::default(), bend: None }
     }
 }
 
@@ -109,6 +112,8 @@ pub struct Prepared {
     pub truth: Planes,
     /// For [`Region::Mask`]: 1 for pixels that count, 0 for others.
     pub weights: Option<Vec<f64>>,
+    /// [`Wanted::bend`] of the pixels that are left.
+    pub bend: Option<Vec<f32>>,
 }
 
 impl Protocol {
@@ -136,7 +141,7 @@ impl Protocol {
         truth: Truth<'_>,
         wanted: Wanted<'_>,
     ) -> Result<FrameScore, MetricsError> {
-        let images = self.prepare(render, truth)?;
+        let images = self.prepare_with(render, truth, wanted.bend)?;
         let errors = ErrorSums::new(&images.render, &images.truth, images.weights.as_deref())?;
         let mut score = FrameScore {
             protocol: self.key(),
@@ -161,6 +166,16 @@ impl Protocol {
     /// # Errors
     /// As [`Protocol::score`], but for the SSIM window.
     pub fn prepare(&self, render: &Image, truth: Truth<'_>) -> Result<Prepared, MetricsError> {
+        self.prepare_with(render, truth, None)
+    }
+
+    /// [`Protocol::prepare`], with [`Wanted::bend`] beside the images.
+    fn prepare_with(
+        &self,
+        render: &Image,
+        truth: Truth<'_>,
+        bend: Option<&[f32]>,
+    ) -> Result<Prepared, MetricsError> {
         let size = (render.width(), render.height());
         let rgb = truth.rgb();
         MetricsError::check_size("truth", (rgb.width(), rgb.height()), size)?;
@@ -191,7 +206,7 @@ impl Protocol {
             }
             finish(y, rgb);
         })?;
-        self.cut(render, rgb, truth.mask())
+        self.cut(render, rgb, truth.mask(), bend)
     }
 
     /// How the region changes pixels.
@@ -214,22 +229,32 @@ impl Protocol {
     }
 
     /// Crops to the region, or adds its weights.
-    fn cut(&self, render: Planes, truth: Planes, mask: Option<&Mask>) -> Result<Prepared, MetricsError> {
+    fn cut(
+        &self,
+        render: Planes,
+        truth: Planes,
+        mask: Option<&Mask>,
+        bend: Option<&[f32]>,
+    ) -> Result<Prepared, MetricsError> {
         let (region, threshold) = (self.region, self.mask_threshold);
+        if let Some(bend) = bend
+            && bend.len() != render.pixels()
+        {
+            return Err(MetricsError::BendSize { values: bend.len(), pixels: render.pixels() });
+        }
         let crop = |mask: &Mask, exclusive: bool| {
             let empty = || empty(mask, threshold, region);
             let rect = bounding_box(mask, threshold, exclusive).ok_or_else(empty)?;
-            Ok(Prepared { render: render.crop(&rect), truth: truth.crop(&rect), weights: None })
+            let bend = bend.map(|bend| rect.cut(bend, render.width()));
+            Ok(Prepared { render: render.crop(&rect), truth: truth.crop(&rect), weights: None, bend })
         };
-        match (region, mask) {
-            (Region::MaskBoundingBox, Some(mask)) => crop(mask, false),
-            (Region::MaskBoundingBoxExclusive, Some(mask)) => crop(mask, true),
-            (Region::Mask, Some(mask)) => {
-                let weights = Some(inside(mask, threshold, region)?);
-                Ok(Prepared { render, truth, weights })
-            }
-            _ => Ok(Prepared { render, truth, weights: None }),
-        }
+        let weights = match (region, mask) {
+            (Region::MaskBoundingBox, Some(mask)) => return crop(mask, false),
+            (Region::MaskBoundingBoxExclusive, Some(mask)) => return crop(mask, true),
+            (Region::Mask, Some(mask)) => Some(inside(mask, threshold, region)?),
+            _ => None,
+        };
+        Ok(Prepared { render, truth, weights, bend: bend.map(<[f32]>::to_vec) })
     }
 }
 

@@ -25,6 +25,7 @@ mod push_forward;
 mod rest_faces;
 mod rotate;
 mod spec;
+mod spread;
 mod strategy;
 mod surface;
 mod surfel;
@@ -40,6 +41,7 @@ pub use presets::{PRESETS, Preset};
 pub use push_forward::Across;
 pub use rotate::{LbsProjection, NamedRotation, RotationChoice};
 pub use spec::{Variation, variations};
+pub use spread::face_spreads;
 pub use strategy::{ClampChoice, ColourChoice, CovarianceChoice, Strategy};
 
 /// Version of this code as part of content keys. Raise it by hand, with a line in CHANGELOG.md, whenever a change moves

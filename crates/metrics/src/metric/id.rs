@@ -68,6 +68,17 @@ impl MetricId {
         self.metric().higher_is_better
     }
 
+    /// Whether it asks by how much the body is bent where a pixel shows it: [`Wanted::bend`](crate::Wanted::bend).
+    pub fn needs_bend(self) -> bool {
+        self.metric().needs == super::bend::NEEDS
+    }
+
+    /// The angles between joints of the pixels that it is taken over, if it is one of the metrics that share out the body by
+    /// them: from the first on and below the second, degrees.
+    pub fn bend_class(self) -> Option<[u32; 2]> {
+        super::bend::CLASSES.iter().find(|(id, _)| *id == self.id()).map(|&(_, class)| class)
+    }
+
     /// Whether each frame has a value of its own; the others are of the avatar.
     pub fn is_of_frames(self) -> bool {
         matches!(self.metric().measure, Measure::Frame { .. })

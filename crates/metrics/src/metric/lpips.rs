@@ -17,7 +17,7 @@ pub(super) const METRIC: Metric = Metric {
 };
 
 fn score(frame: &FrameInput<'_>) -> Result<Measured, MetricsError> {
-    let Prepared { render, truth, weights } = frame.images;
+    let Prepared { render, truth, weights, .. } = frame.images;
     let variant = frame.protocol.lpips;
     let distance = match (weights, frame.lpips) {
         (Some(_), _) => Err(MetricsError::NoImage { region: frame.protocol.region.id() }),

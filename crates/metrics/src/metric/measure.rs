@@ -43,8 +43,10 @@ pub enum Measure {
 /// How the value of a sequence comes from its frames.
 #[derive(Clone, Copy, Debug)]
 pub enum OverFrames {
-    /// The mean of the frames.
+    /// The mean of the frames; none unless every frame has a value.
     Mean,
+    /// The mean of the frames that have a value: frames in which there is nothing to measure say nothing.
+    MeanWhereThere,
     /// As the protocol's [`Aggregation`](crate::Aggregation) says: the mean of the frames, or this function of the mean
     /// squared errors of R, G and B over the pixels of all frames.
     Pooled(fn(&Protocol, [f64; 3]) -> f64),

@@ -18,7 +18,7 @@ pub(super) const METRIC: Metric = Metric {
 };
 
 fn score(frame: &FrameInput<'_>) -> Result<Measured, MetricsError> {
-    let Prepared { render, truth, weights } = frame.images;
+    let Prepared { render, truth, weights, .. } = frame.images;
     let variant = frame.protocol.ssim;
     ssim_of_planes(render, truth, &variant.settings(), variant.id(), weights.as_deref()).map(Measured::Value)
 }

@@ -1,7 +1,4 @@
-//! Does a data set fit itself? The posed body, projected into every frame, against the frame's mask.
-//!
-//! What goes wrong when data is prepared shows in the overlap of the two silhouettes: masks the wrong way round, poses that
-//! are shifted against frames, another body or camera. [`sequence`] measures the overlap and names what it finds.
+#![doc = include_str!("../README.md")]
 
 mod findings;
 mod lens;
