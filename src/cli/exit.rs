@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Exit {
+pub(crate) enum Exit {
     /// Done, and the verdict, if one was asked for, is good.
     Success = 0,
     /// Ran to the end, and the verdict is bad: a regression against a baseline, say.

@@ -66,8 +66,7 @@ impl Fit {
         let recipe = Recipe::parse(&self.recipe)?;
         let (dataset, subject) = self.data.subject(&self.subject)?;
         let (training, tests) = self.sequences(&subject)?;
-        let own = recipe.iterations;
-        let iterations = self.profile.fit_iterations.map_or(own, |most| own.min(most));
+        let iterations = recipe.length(training.frames.len(), self.profile.fit_iterations);
         let options = FitOptions {
             recipe,
             iterations: self.iterations.unwrap_or(iterations),

@@ -28,7 +28,7 @@ mod trade;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use exit::Exit;
-use std::process::ExitCode;
+use std::ffi::OsString;
 
 /// How should a Gaussian rotate on a skinned body?
 ///
@@ -84,9 +84,9 @@ impl Context {
     }
 }
 
-/// Parses the command line and runs the subcommand.
-pub(crate) fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+/// Parses a command line, the program's name first, and runs the subcommand.
+pub(crate) fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => return answered(&error),
     };
@@ -95,27 +95,27 @@ pub(crate) fn main() -> ExitCode {
         .and_then(|_| set_threads(cli.threads))
         .and_then(|()| cli.command.run(Context { quiet: cli.quiet }));
     match result {
-        Ok(exit) => exit.into(),
-        Err(error) if output::is_broken_pipe(&error) => Exit::Success.into(),
+        Ok(exit) => exit,
+        Err(error) if output::is_broken_pipe(&error) => Exit::Success,
         Err(error) => {
             report_error(&one_line(&format!("{error:#}")));
-            Exit::Unusable.into()
+            Exit::Unusable
         }
     }
 }
 
 /// Help and versions as they are asked for; wrong usage as one line.
-fn answered(error: &clap::Error) -> ExitCode {
+fn answered(error: &clap::Error) -> Exit {
     if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         // A reader that went away is no error, and nobody is left to be told of another.
         let _ = error.print();
-        return if error.use_stderr() { Exit::Unusable } else { Exit::Success }.into();
+        return if error.use_stderr() { Exit::Unusable } else { Exit::Success };
     }
     let text = error.render().to_string();
     let parts = text.split("\n\n").filter(|part| !part.starts_with("For more information"));
     let line = parts.map(one_line).collect::<Vec<_>>().join("; ");
     report_error(line.trim_start_matches("error: "));
-    Exit::Unusable.into()
+    Exit::Unusable
 }
 
 #[allow(clippy::print_stderr, reason = "the one place that writes errors")]

@@ -204,8 +204,7 @@ impl Planner<'_> {
         let made = self.of_frames(&training);
         let recipe =
             Recipe::parse(recipe).map_err(|error| (error.to_string(), "a fitting recipe".to_owned()))?;
-        let most = self.profile.fit_iterations.unwrap_or(u32::MAX);
-        let iterations = recipe.iterations.min(most);
+        let iterations = recipe.length(training.frames.len(), self.profile.fit_iterations);
         let options = FitOptions { recipe, iterations, seed, edge_mm: self.profile.avatar_edge_mm };
         let start = content_key(&json!({ "start": made, "how": Starting::of(&options) }));
         let content = json!({

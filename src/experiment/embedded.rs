@@ -12,10 +12,16 @@ pub const EMBEDDED: &[(&str, &str)] = &[
 
 /// Experiments of our own.
 pub const FURTHER: &[(&str, &str)] = &[
-    ("experiments/attribution-animatable.toml", include_str!("../../experiments/attribution-animatable.toml")),
+    (
+        "experiments/attribution-animatable.toml",
+        include_str!("../../experiments/attribution-animatable.toml"),
+    ),
     ("experiments/attribution-hugs.toml", include_str!("../../experiments/attribution-hugs.toml")),
     ("experiments/attribution-ihuman.toml", include_str!("../../experiments/attribution-ihuman.toml")),
-    ("experiments/attribution-splattingavatar.toml", include_str!("../../experiments/attribution-splattingavatar.toml")),
+    (
+        "experiments/attribution-splattingavatar.toml",
+        include_str!("../../experiments/attribution-splattingavatar.toml"),
+    ),
     ("experiments/bend.toml", include_str!("../../experiments/bend.toml")),
     ("experiments/budget.toml", include_str!("../../experiments/budget.toml")),
     ("experiments/parts.toml", include_str!("../../experiments/parts.toml")),

@@ -80,7 +80,8 @@ pub(super) fn expand(mut e: Experiment, file: &str) -> Result<Experiment, Error>
 }
 
 fn check(grid: &Grid, key: &str, room: usize, file: &str) -> Result<(), Error> {
-    let fail = |key: String, problem: String, expected: &str| Err(Error::invalid(file, key, problem, expected));
+    let fail =
+        |key: String, problem: String, expected: &str| Err(Error::invalid(file, key, problem, expected));
     let mut names = BTreeSet::new();
     for (i, axis) in grid.axes.iter().enumerate() {
         if axis.choices.is_empty() {
@@ -184,7 +185,8 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        let axis = |choices: &str| format!("[[grids]]\naxes = [{{ name = \"how\", choices = [{choices}] }}]\n");
+        let axis =
+            |choices: &str| format!("[[grids]]\naxes = [{{ name = \"how\", choices = [{choices}] }}]\n");
         let many: String = (0..MOST + 1).map(|i| format!("{{ id = \"{i}\" }},")).collect();
         let cases = [
             (axis(""), "grids[0].axes[0].choices: none; expected at least one"),
@@ -193,7 +195,8 @@ mod tests {
             (AXES.replace("degree", "how"), "grids[0].axes[1].name: `how` twice; expected each once"),
         ];
         for (axes, expected) in cases {
-            let error = Experiment::parse(&[HEAD, &axes, VARIANT].concat(), "x.toml").unwrap_err().to_string();
+            let error =
+                Experiment::parse(&[HEAD, &axes, VARIANT].concat(), "x.toml").unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
         let wrong = [HEAD, AXES, &VARIANT.replace("strategy", "stratagem")].concat();

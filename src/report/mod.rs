@@ -26,9 +26,9 @@ mod paper;
 mod replicates;
 mod results;
 
+pub use bend::{bend_csv, bend_plots};
 pub use collect::results;
 pub use comparison::{Comparison, MetricDifference};
-pub use bend::{bend_csv, bend_plots};
 pub use curves::{curve_plots, curves_csv};
 pub use markdown::markdown;
 pub use page::page;

@@ -31,6 +31,8 @@ pub struct Recipe {
     pub sh_step: f32,
     /// Iterations (one training frame each) of the method itself; profiles may allow fewer.
     pub iterations: u32,
+    /// How often the method itself sees each training image, where its length is stated so; 0: `iterations` says.
+    pub epochs: u32,
     /// What is behind the avatar and the truth in the loss.
     pub background: FitBackground,
     /// Where the Gaussians are before the first iteration.
@@ -244,9 +246,10 @@ pub struct LossTerms {
     pub ssim: f32,
     /// Of the L1 distance of the silhouettes.
     pub silhouette: f32,
-    /// Of the mean of `max(longest/shortest - ratio, 0) + max(longest - limit, 0)` over Gaussians (SplattingAvatar), with
-    /// `longest` and `shortest` of the two larger standard deviations, `limit` in metres.
+    /// Of Gaussians that are long and thin, as `long_thin_form` counts them.
     pub long_thin: f32,
+    /// What is summed over them.
+    pub long_thin_form: LongThin,
     /// The ratio above which a Gaussian counts as long and thin.
     pub long_thin_ratio: f32,
     /// The standard deviation above which a Gaussian counts as long, metres.
@@ -260,6 +263,18 @@ pub struct LossTerms {
     /// Of the mean over Gaussians of the squared norm of their SH coefficients beyond degree 0: directions from which
     /// nothing was seen look like those from which something was.
     pub sh_rest: f32,
+}
+
+/// What counts as a long and thin Gaussian, and how much.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LongThin {
+    /// The mean over all Gaussians of `max(longest / second - ratio, 0) + max(longest - limit, 0)`, with the two larger standard
+    /// deviations: flat discs are not thin.
+    Excess,
+    /// The mean longest standard deviation of the Gaussians with `longest > limit` and `longest / shortest > ratio`:
+    /// SplattingAvatar's own.
+    SplattingAvatar,
 }
 
 /// A textured mesh that is drawn with the Gaussians (HAHA): the body, its vertices moved onto the outlines in the masks,
@@ -350,6 +365,17 @@ impl Recipe {
     /// An unknown recipe, field or value, or a number out of range.
     pub fn parse(specification: &str) -> Result<Self, Error> {
         file::parse(specification)
+    }
+
+    /// Number of iterations of a fit to so many training images: `iterations`, but no more than a profile allows; without such a
+    /// bound, the method's own number.
+    pub fn length(&self, images: usize, most: Option<u32>) -> u32 {
+        let images = u32::try_from(images).unwrap_or(u32::MAX);
+        match (most, self.epochs) {
+            (Some(most), _) => self.iterations.min(most),
+            (None, 0) => self.iterations,
+            (None, epochs) => epochs.saturating_mul(images).max(1),
+        }
     }
 
     /// The SH degree in force at an iteration out of a number.

@@ -1,7 +1,7 @@
 //! Terms of the loss that look at the parameters and not at images, with their derivatives.
 
 use super::parameters::Origin;
-use crate::recipe::LossTerms;
+use crate::recipe::{LongThin, LossTerms};
 use glam::Vec3;
 use rayon::prelude::*;
 use skinsplat_core::math::portable;
@@ -23,8 +23,13 @@ pub(super) fn add(
             let weight = terms.scale / (3.0 * n);
             total += f64::from(weight * square.element_sum());
             *out += 2.0 * weight * square;
-            total += f64::from(long_thin(terms, scale, terms.long_thin / n, out));
+            if terms.long_thin_form == LongThin::Excess {
+                total += f64::from(excess(terms, scale, terms.long_thin / n, out));
+            }
         }
+    }
+    if terms.long_thin > 0.0 && terms.long_thin_form == LongThin::SplattingAvatar {
+        total += needles(terms, avatar, gradient);
     }
     if terms.opacity > 0.0 {
         let weight = terms.opacity / n;
@@ -44,7 +49,7 @@ pub(super) fn add(
 }
 
 /// `weight` times `max(a/b - ratio, 0) + max(a - limit, 0)` for the largest standard deviation a and the second b.
-fn long_thin(terms: &LossTerms, scale: Vec3, weight: f32, out: &mut Vec3) -> f32 {
+fn excess(terms: &LossTerms, scale: Vec3, weight: f32, out: &mut Vec3) -> f32 {
     if weight == 0.0 {
         return 0.0;
     }
@@ -64,6 +69,24 @@ fn long_thin(terms: &LossTerms, scale: Vec3, weight: f32, out: &mut Vec3) -> f32
         out[first] += weight * long;
     }
     value
+}
+
+/// [`LongThin::SplattingAvatar`].
+fn needles(terms: &LossTerms, avatar: &Avatar, gradient: &mut AvatarGradient) -> f64 {
+    let scales = avatar.gaussians.log_scales.iter().map(|log_scale| log_scale.map(portable::exp));
+    let found: Vec<(usize, f32, usize)> = scales
+        .enumerate()
+        .filter_map(|(i, scale)| {
+            let (longest, shortest) = (scale.max_element(), scale.min_element());
+            let counts = longest > terms.long_thin_limit && longest > terms.long_thin_ratio * shortest;
+            counts.then(|| (i, longest, scale.max_position()))
+        })
+        .collect();
+    let weight = terms.long_thin / found.len().max(1) as f32;
+    for &(i, longest, axis) in &found {
+        gradient.log_scales[i][axis] += weight * longest;
+    }
+    found.iter().map(|&(_, longest, _)| f64::from(weight * longest)).sum()
 }
 
 /// `weight` times the sum of the squared SH coefficients beyond degree 0. In parts of fixed size, so that the sum does not
@@ -140,10 +163,29 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_the_value() {
-        let recipe = Recipe::parse(
-            "pure-skinned+loss.long_thin=0.3+loss.scale=40.0+loss.opacity=0.2+loss.sh_rest=0.7",
-        )
-        .expect("known");
+        let changes = "loss.long_thin=0.3+loss.scale=40.0+loss.opacity=0.2+loss.sh_rest=0.7";
+        for form in ["excess", "splatting-avatar"] {
+            let recipe = format!("pure-skinned+{changes}+loss.long_thin_form=\"{form}\"");
+            derivatives_of(Recipe::parse(&recipe).expect("known"));
+        }
+    }
+
+    #[test]
+    fn needles_are_counted_as_splatting_avatar_counts_them() {
+        let recipe =
+            Recipe::parse("pure-skinned+loss.long_thin=0.5+loss.long_thin_form=\"splatting-avatar\"");
+        let terms = LossTerms { scale: 0.0, ..recipe.expect("known").loss };
+        let own = avatar();
+        let mut gradient = AvatarGradient::default();
+        gradient.reset(&own.gaussians, true);
+        // The third is neither longer than 8 mm nor ten times as long as thick.
+        let value = needles(&terms, &own, &mut gradient);
+        assert!((value - 0.5 * (0.02 + 0.03) / 2.0).abs() < 1e-8, "{value}");
+        assert_eq!(gradient.log_scales[2], Vec3::ZERO);
+        assert!(gradient.log_scales[0].x > 0.0 && gradient.log_scales[1].y > 0.0);
+    }
+
+    fn derivatives_of(recipe: Recipe) {
         let terms = LossTerms { displacement: 5.0, ..recipe.loss };
         let mut moved = avatar();
         let origins = Origin::of(&moved);

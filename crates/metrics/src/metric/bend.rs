@@ -23,18 +23,30 @@ pub(super) const CLASSES: [(&str, [u32; 2]); 6] = [
     (FROM_120.id, [120, 180]),
 ];
 
-pub(super) const BELOW_15: Metric =
-    metric("psnr-bend-0", "PSNR, below 15°", "PSNR where joints are less than 15 degrees apart", score::<0, 15>);
+pub(super) const BELOW_15: Metric = metric(
+    "psnr-bend-0",
+    "PSNR, below 15°",
+    "PSNR where joints are less than 15 degrees apart",
+    score::<0, 15>,
+);
 pub(super) const FROM_15: Metric =
     metric("psnr-bend-15", "PSNR, 15-30°", "PSNR where joints are 15 to 30 degrees apart", score::<15, 30>);
 pub(super) const FROM_30: Metric =
     metric("psnr-bend-30", "PSNR, 30-60°", "PSNR where joints are 30 to 60 degrees apart", score::<30, 60>);
 pub(super) const FROM_60: Metric =
     metric("psnr-bend-60", "PSNR, 60-90°", "PSNR where joints are 60 to 90 degrees apart", score::<60, 90>);
-pub(super) const FROM_90: Metric =
-    metric("psnr-bend-90", "PSNR, 90-120°", "PSNR where joints are 90 to 120 degrees apart", score::<90, 120>);
-pub(super) const FROM_120: Metric =
-    metric("psnr-bend-120", "PSNR, 120° and more", "PSNR where joints are 120 degrees apart or more", score::<120, END>);
+pub(super) const FROM_90: Metric = metric(
+    "psnr-bend-90",
+    "PSNR, 90-120°",
+    "PSNR where joints are 90 to 120 degrees apart",
+    score::<90, 120>,
+);
+pub(super) const FROM_120: Metric = metric(
+    "psnr-bend-120",
+    "PSNR, 120° and more",
+    "PSNR where joints are 120 degrees apart or more",
+    score::<120, END>,
+);
 pub(super) const BENT: Metric =
     metric("psnr-bent", "PSNR, bent", "PSNR where joints are 60 degrees apart or more", score::<60, END>);
 
