@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const MODULES: [&str; 5] = ["check", "datasets", "experiment", "run", "report"];
 
 /// The crates, and what each may be built on. Tests and examples may use more.
-const CRATES: [(&str, &[&str]); 13] = [
+const CRATES: [(&str, &[&str]); 14] = [
     ("core", &[]),
     ("simd", &[]),
     ("table", &[]),
@@ -19,6 +19,7 @@ const CRATES: [(&str, &[&str]); 13] = [
     ("metrics", &["core", "simd", "lpips-alex"]),
     ("data", &["core"]),
     ("statistics", &["core"]),
+    ("conform", &["core", "data"]),
     ("synthetic", &["core", "data", "render"]),
     ("fit", &["core", "simd", "data", "posing", "render"]),
     ("study", &["core", "simd", "data", "fit", "metrics", "plot", "posing", "render", "synthetic", "table"]),
