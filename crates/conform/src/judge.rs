@@ -155,6 +155,9 @@ impl Judge<'_> {
             };
             let (pose, gaussian) = (self.frames[at / gaussians], at % gaussians);
             let (expected, got) = (predicted[range(field)].to_vec(), found[range(field)].to_vec());
+            if error <= self.tolerance {
+                continue;
+            }
             worst.push(Worst { gaussian, pose, field, error, expected, got });
         }
         worst.sort_by(|a, b| b.error.total_cmp(&a.error));

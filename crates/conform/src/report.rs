@@ -132,7 +132,7 @@ impl Report {
                 let _ = writeln!(
                     text,
                     "    Gaussian {} in pose {}, {}: off by {}, expected {}, got {}",
-                    worst["gaussian"],
+                    worst["index"],
                     worst["pose"],
                     worst["field"].as_str().unwrap_or_default(),
                     worst["error"],
@@ -207,7 +207,7 @@ fn unknown(judge: &Judge<'_>, findings: &Findings) -> Value {
     let worst = judge.worst(&judge.predict(&Model::default()), findings.unexplained, WORST);
     let value = |worst: &Worst| {
         json!({
-            "gaussian": worst.gaussian,
+            "index": worst.gaussian,
             "pose": worst.pose,
             "field": worst.field.name(),
             "error": worst.error,

@@ -222,8 +222,8 @@ fn what_nobody_knows_is_unknown() {
     let report = of_json(&outs);
     expect(&report, &["unknown"], "two moved");
     let worst = &report.explanations[0]["worst"];
-    assert_eq!((worst[0]["gaussian"].as_u64(), worst[0]["pose"].as_u64()), (Some(17), Some(2)));
-    assert_eq!((worst[1]["gaussian"].as_u64(), worst[1]["field"].as_str()), (Some(5), Some("means")));
+    assert_eq!((worst[0]["index"].as_u64(), worst[0]["pose"].as_u64()), (Some(17), Some(2)));
+    assert_eq!((worst[1]["index"].as_u64(), worst[1]["field"].as_str()), (Some(5), Some("means")));
     assert!((worst[0]["error"].as_f64().unwrap() - 0.25).abs() < 1e-9);
     // Known where it is known.
     let mut outs = skin(&bench().inputs, &["sh-not-turned"]);

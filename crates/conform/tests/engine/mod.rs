@@ -354,8 +354,8 @@ fn finish(out: &mut Out, has: &dyn Fn(&str) -> bool) {
     }
     if has("y-up-for-z-up") {
         // (x, -z, y): everything in the world turns by 90 degrees about x.
-        let swap = |[x, y, z]: V3| [x, -z, y];
-        out.mean = swap(out.mean);
+        let [x, y, z] = out.mean;
+        out.mean = [x, -z, y];
         let half = 0.5f64.sqrt();
         out.quat = mul([half, half, 0.0, 0.0], out.quat);
         let [xx, xy, xz, yy, yz, zz] = out.covariance;
