@@ -19,6 +19,7 @@ const CRATES: [(&str, &[&str]); 14] = [
     ("metrics", &["core", "simd", "lpips-alex"]),
     ("data", &["core"]),
     ("statistics", &["core"]),
+    ("conform", &["core", "data"]),
     ("synthetic", &["core", "data", "render"]),
     ("check", &["core", "data", "render"]),
     ("fit", &["core", "simd", "data", "posing", "render"]),

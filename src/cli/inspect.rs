@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 /// Show what a file or folder holds, and what is wrong with it.
 ///
-/// Reads avatars (.ply, .npz, .pth, .ckpt, exports of SplattingAvatar), bodies (.npz, .pkl, .glb, .gltf), poses and cameras
+/// Reads avatars (.ply, .npz, .pth, .ckpt, .glb with Gaussians, exports of SplattingAvatar), bodies (.npz, .pkl, .glb, .gltf), poses and cameras
 /// (.npz, .pkl, .json), images, results.json and the results store of a run; and folders: a subject in any of the layouts that
 /// are read, folders of subjects, exports of SplattingAvatar, images that another program rendered.
 #[derive(Debug, clap::Args)]
@@ -43,7 +43,7 @@ impl Inspect {
             "ply" | "pth" | "pt" | "ckpt" | "spz" | "splat" | "ksplat" | "sog" => {
                 avatar_text(&read_avatar(path)?)
             }
-            "glb" | "gltf" => body_text(&body::read(path)?) + &clips_text(path)?,
+            "glb" | "gltf" => gltf_text(path)?,
             "npz" | "pkl" | "pickle" => arrays_text(path)?,
             "json" => json_text(path)?,
             "jsonl" => store_text(path)?,
@@ -56,6 +56,18 @@ impl Inspect {
         };
         emit(&format!("{}\n{text}", path.display()))?;
         Ok(Exit::Success)
+    }
+}
+
+/// Gaussians, a body, or both: a skinned file of Gaussians.
+fn gltf_text(path: &Path) -> Result<String> {
+    let rig = || Ok::<_, anyhow::Error>(body_text(&body::read(path)?) + &clips_text(path)?);
+    match read_avatar(path) {
+        Ok(loaded) if loaded.is_bound() => Ok(avatar_text(&loaded) + &rig()?),
+        Ok(loaded) => Ok(avatar_text(&loaded)),
+        // No Gaussians in it.
+        Err(error) if error.field() == "avatar" => rig(),
+        Err(error) => Err(error.into()),
     }
 }
 

@@ -3,8 +3,10 @@
 mod blend;
 mod check;
 mod completions;
+mod conform;
 mod data;
 mod exit;
+mod export;
 mod fetch_help;
 mod fit;
 mod inspect;
@@ -60,11 +62,13 @@ enum Command {
     Fit(fit::Fit),
     Render(render::Render),
     Skin(skin::Skin),
+    Export(export::Export),
     Score(score::Score),
     Blend(blend::Blend),
     Trade(trade::Trading),
     Stress(stress::Stress),
     Inspect(inspect::Inspect),
+    Conform(conform::Conform),
     Completions(completions::Completions),
 }
 
@@ -142,11 +146,13 @@ impl Command {
             Self::Fit(command) => command.run(context),
             Self::Render(command) => command.run(context),
             Self::Skin(command) => command.run(context),
+            Self::Export(command) => command.run(context),
             Self::Score(command) => command.run(context),
             Self::Blend(command) => command.run(),
             Self::Trade(command) => command.run(context),
             Self::Stress(command) => command.run(context),
             Self::Inspect(command) => command.run(context),
+            Self::Conform(command) => command.run(context),
             Self::Completions(command) => command.run(),
         }
     }

@@ -15,7 +15,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Which pose to take, and how to rotate the Gaussians.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Posing")]
 pub(super) struct Posing {
     /// Body model: SMPL-style .npz or .pkl, or skinned .glb or .gltf
@@ -43,8 +43,20 @@ pub(super) struct Subject {
     rest: Option<(RestBody, Pose)>,
     /// The poses of the track before this one.
     before: Vec<Pose>,
+    /// Poses per second, if the track says so.
+    framerate: Option<f64>,
     /// What has to be said of the files, each with its name.
     notes: Vec<String>,
+}
+
+/// A body and consecutive poses of it.
+pub(super) struct Track<'a> {
+    /// The body in its rest pose.
+    pub(super) rest: &'a RestBody,
+    /// From the first pose of the track to that of `--frame`.
+    pub(super) poses: Vec<&'a Pose>,
+    /// Poses per second; 30 if the file does not say.
+    pub(super) framerate: f64,
 }
 
 impl Posing {
@@ -58,6 +70,18 @@ impl Posing {
         self.body.is_some()
     }
 
+    /// True if a track of poses was named.
+    pub(super) fn has_poses(&self) -> bool {
+        self.poses.is_some()
+    }
+
+    /// The same with the last pose of the track, so that all of it is loaded.
+    pub(super) fn at_last_frame(&self) -> Result<Self> {
+        let Some(path) = &self.poses else { bail!("--poses is missing: no track") };
+        let track = poses::load_clip(path, self.clip.as_deref())?;
+        Ok(Self { frame: track.len().saturating_sub(1), ..self.clone() })
+    }
+
     /// Loads the avatar and, if a body was named, the body in its shape and the pose of the frame.
     pub(super) fn load(&self, avatar: &Path) -> Result<Subject> {
         let loaded = read_avatar(avatar)?;
@@ -69,11 +93,12 @@ impl Posing {
             let note = "the body has the shape (betas) that this file holds".to_owned();
             remarks.extend(said(avatar, vec![note]));
         }
-        let Motion { rest, pose, before } = match &self.poses {
+        let Motion { rest, pose, before, framerate } = match &self.poses {
             None => {
                 let (rest, notes) = body::shape(&model.body, betas.as_deref().unwrap_or(&[]), &[])?;
                 remarks.extend(said(body_path, notes));
-                Motion { pose: Pose::rest(&rest.skeleton), rest, before: Vec::new() }
+                let pose = Pose::rest(&rest.skeleton);
+                Motion { pose, rest, before: Vec::new(), framerate: None }
             }
             Some(path) => {
                 let (motion, notes) = self.poses_to_frame(path, &model.body, betas.as_deref())?;
@@ -87,7 +112,8 @@ impl Posing {
         );
         let OnBody { avatar: bound, body, mesh, notes } = on_body(loaded, &rest)?;
         let notes = said(avatar, notes).into_iter().chain(remarks).collect();
-        Ok(Subject { avatar: bound, mesh, rest: Some((body.unwrap_or(rest), pose)), before, notes })
+        let rest = Some((body.unwrap_or(rest), pose));
+        Ok(Subject { avatar: bound, mesh, rest, before, framerate, notes })
     }
 
     /// The body in its shape (that of the avatar, if it has one), the pose of the frame and those before it; and what has to
@@ -108,7 +134,7 @@ impl Posing {
         }
         poses.truncate(self.frame + 1);
         let pose = poses.remove(self.frame);
-        Ok((Motion { rest, pose, before: poses }, notes))
+        Ok((Motion { rest, pose, before: poses, framerate: track.framerate }, notes))
     }
 }
 
@@ -124,7 +150,7 @@ fn as_it_stands(loaded: LoadedAvatar) -> Result<Subject> {
     }
     avatar.binding = Binding::Static;
     let notes = said(&files[0], notes);
-    Ok(Subject { avatar, mesh: None, rest: None, before: Vec::new(), notes })
+    Ok(Subject { avatar, mesh: None, rest: None, before: Vec::new(), framerate: None, notes })
 }
 
 /// Notes with the file that they are about.
@@ -137,6 +163,7 @@ struct Motion {
     rest: RestBody,
     pose: Pose,
     before: Vec<Pose>,
+    framerate: Option<f64>,
 }
 
 /// What a strategy leaves out of joints that scale, if it does.
@@ -153,6 +180,13 @@ impl Subject {
     /// The canonical avatar.
     pub(super) fn avatar(&self) -> &Avatar {
         &self.avatar
+    }
+
+    /// The body and the poses up to that of the frame; `None` without a body.
+    pub(super) fn track(&self) -> Option<Track<'_>> {
+        let (rest, pose) = self.rest.as_ref()?;
+        let poses = self.before.iter().chain([pose]).collect();
+        Some(Track { rest, poses, framerate: self.framerate.unwrap_or(30.0) })
     }
 
     /// What has to be said of avatar, body and poses, a line each.

@@ -16,6 +16,7 @@ mod bad_plans;
 mod blending;
 mod bodies_of_tables;
 mod catalogues;
+mod conforming;
 mod fitting;
 mod foreign_avatars;
 mod foreign_bodies;

@@ -4,7 +4,7 @@ use crate::args;
 use crate::program::Desk;
 use std::process::{Command, Stdio};
 
-const SUBCOMMANDS: [&str; 13] = [
+const SUBCOMMANDS: [&str; 15] = [
     "run",
     "plan",
     "report",
@@ -12,11 +12,13 @@ const SUBCOMMANDS: [&str; 13] = [
     "fit",
     "render",
     "skin",
+    "export",
     "score",
     "blend",
     "trade",
     "stress",
     "inspect",
+    "conform",
     "completions",
 ];
 
@@ -37,6 +39,7 @@ fn top_level_help() {
       fit          Fit an avatar to a subject's training frames
       render       Render an avatar, posed or as it stands
       skin         Pose an avatar and write a plain static 3DGS PLY
+      export       Write an avatar as files that other programs open: posed PLY, posed GLB, skinned GLB
       score        Score renders against truth: two images, or two folders whose frames pair up by name
       blend        Blend rotations with every solver: check a shader or an engine against the exact
                    answer
@@ -44,6 +47,7 @@ fn top_level_help() {
       stress       Try every strategy and solver on inputs that are hard on purpose, and say what holds,
                    degrades and breaks
       inspect      Show what a file or folder holds, and what is wrong with it
+      conform      Check an engine that skins Gaussians, and name its bug
       completions  Print a completion script for a shell
       help         Print this message or the help of the given subcommand(s)
 
@@ -56,7 +60,7 @@ fn top_level_help() {
 
     Exit codes:
       0  done
-      1  ran, and the verdict is bad (a regression against a baseline, data that does not fit)
+      1  ran, and the verdict is bad (a regression against a baseline, data or an engine that does not fit)
       2  could not run: usage, input or disk; one line on stderr says which file and field
       3  incomplete: some frames failed or are missing from the tables
     "#);

@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3, Vec3};
 use skinsplat_core::math::average::Solver;
 use skinsplat_core::math::rotation::SignPolicy;
 use skinsplat_core::scene::{Avatar, Binding, FaceBinding, Gaussians, Pose, RestBody, Skeleton, SkinWeights};
-use skinsplat_posing::{ColourChoice, CovarianceChoice, PRESETS, RotationChoice, Strategy};
+use skinsplat_posing::{ColourChoice, CovarianceChoice, PRESETS, Preset, RotationChoice, Strategy};
 
 pub(crate) const JOINTS: usize = 5;
 const RINGS: usize = 21;
@@ -160,20 +160,23 @@ pub(crate) fn strategies() -> Vec<Strategy> {
     // Seeds of tests follow the order: new choices come last.
     let is_new = |strategy: &Strategy| {
         pushes(strategy)
-            || strategy.rotation == RotationChoice::LiftedSum
+            || [RotationChoice::LiftedSum, RotationChoice::JointSum].contains(&strategy.rotation)
             || strategy.covariance == CovarianceChoice::RotateByAverage
     };
-    let mut all: Vec<Strategy> = PRESETS.iter().map(|preset| preset.strategy).collect();
+    let (engines, presets): (Vec<&Preset>, Vec<&Preset>) =
+        PRESETS.iter().partition(|preset| preset.is_engine());
+    let mut all: Vec<Strategy> = presets.iter().map(|preset| preset.strategy).collect();
     all.extend(RotationChoice::named().flat_map(variants));
     for id in ["closed-form", "eigen", "polar", "power-15", "nlerp", "squaring-6", "vertex-average-eigen"] {
         all.extend(variants(id.parse().unwrap()));
     }
-    for preset in PRESETS {
+    for preset in presets {
         all.extend(ColourChoice::ALL.map(|colour| Strategy { colour, ..preset.strategy }));
         all.extend(CovarianceChoice::ALL.map(|covariance| Strategy { covariance, ..preset.strategy }));
     }
     let (new, mut all): (Vec<_>, Vec<_>) = all.into_iter().partition(is_new);
     all.extend(new);
+    all.extend(engines.iter().map(|preset| preset.strategy));
     all
 }
 
@@ -198,6 +201,7 @@ pub(crate) fn equivariant(rotation: RotationChoice) -> bool {
             | LbsProjection::MatrixToQuaternion
             | LbsProjection::MatrixToQuaternionRaw => false,
         },
+        RotationChoice::JointSum => false,
         RotationChoice::VertexQuaternions(policy) => policy == SignPolicy::AlignToFirst,
         RotationChoice::QuaternionAverage(solver) | RotationChoice::VertexAverage(solver) => {
             !matches!(solver, Solver::Squaring { .. })

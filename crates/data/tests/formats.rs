@@ -21,6 +21,8 @@ mod pickles;
 mod smpl;
 #[path = "formats/smplx_package.rs"]
 mod smplx_package;
+#[path = "formats/splats.rs"]
+mod splats;
 #[path = "formats/splatting_avatar.rs"]
 mod splatting_avatar;
 #[path = "../../../tests/support/mod.rs"]

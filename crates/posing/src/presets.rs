@@ -3,7 +3,7 @@
 use super::{
     Across, ClampChoice, ColourChoice, CovarianceChoice, FaceFrame, LbsProjection, RotationChoice, Strategy,
 };
-use skinsplat_core::math::average::Solver;
+use skinsplat_core::math::average::{Solver, Start};
 use skinsplat_core::math::rotation::SignPolicy;
 
 /// A strategy with a name.
@@ -19,7 +19,8 @@ pub struct Preset {
     pub strategy: Strategy,
 }
 
-/// Every preset. The first four are the paper's, in its order.
+/// Every preset. The first four are the paper's, in its order; the last, `engine-…`, are what engines do that skin splats, as far
+/// as a strategy can say it.
 pub const PRESETS: &[Preset] = &[
     Preset {
         id: "lbs",
@@ -164,7 +165,58 @@ pub const PRESETS: &[Preset] = &[
             clamp: ClampChoice::NonNegative,
         },
     },
+    Preset {
+        id: "engine-spark",
+        title: "Spark (engine)",
+        summary: "Spark's skinning, without its 8-bit weights and cut to four bones: dual quaternions, SH alone",
+        strategy: Strategy {
+            rotation: RotationChoice::DualQuaternion,
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::None,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "engine-gaussian-vrm",
+        title: "gaussian-vrm (engine)",
+        summary: "gaussian-vrm's, without the component that it negates by hand: quaternion of the blended matrix, SH alone",
+        strategy: Strategy {
+            rotation: RotationChoice::Lbs(LbsProjection::MatrixToQuaternion),
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::None,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "engine-gaussian-vrm-ue5",
+        title: "gaussian-vrm-ue5 (engine)",
+        summary: "the Unreal port of gaussian-vrm: sum of the joints' quaternions, signs not aligned; SH alone",
+        strategy: Strategy {
+            rotation: RotationChoice::JointSum,
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::None,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
+    Preset {
+        id: "engine-babylon",
+        title: "Babylon.js (engine)",
+        summary: "turned with the heaviest bone alone, as a rigid part (means still blend here); SH alone",
+        strategy: Strategy {
+            rotation: RotationChoice::QuaternionAverage(Solver::Power { steps: 0, start: Start::Heaviest }),
+            covariance: CovarianceChoice::Rotate,
+            colour: ColourChoice::None,
+            clamp: ClampChoice::NonNegative,
+        },
+    },
 ];
+
+impl Preset {
+    /// True for what an engine does.
+    pub fn is_engine(&self) -> bool {
+        self.id.starts_with("engine-")
+    }
+}
 
 impl Strategy {
     /// The preset of that id.

@@ -71,13 +71,14 @@ fn ids(strategy: &Strategy) -> [String; 4] {
     [rotation.to_string(), covariance.to_string(), colour.to_string(), clamp.to_string()]
 }
 
-/// The preset to describe a strategy by: one with the same kind of rotation if there is one, then the one that differs
+/// The preset to describe a strategy by: itself if it is one (else none of an engine), one with the same kind of rotation if there is one, then the one that differs
 /// on the fewest axes, then the first.
 fn nearest_preset(strategy: &Strategy) -> &'static Preset {
     let distance = |preset: &&Preset| {
         let kind = |s: &Strategy| std::mem::discriminant(&s.rotation);
         let differing = ids(&preset.strategy).iter().zip(ids(strategy)).filter(|(a, b)| *a != b).count();
-        (kind(&preset.strategy) != kind(strategy), differing)
+        // What an engine does is named by itself alone, not as a start for something else.
+        (preset.is_engine() && differing > 0, kind(&preset.strategy) != kind(strategy), differing)
     };
     PRESETS.iter().min_by_key(distance).expect("there are presets")
 }

@@ -8,6 +8,7 @@ mod exported;
 mod haha;
 mod npz;
 mod plain;
+mod splats;
 mod start;
 mod unread;
 
@@ -35,6 +36,8 @@ pub enum Format {
     Checkpoint,
     /// A checkpoint of HAHA: Gaussians on faces, and a texture for the body's mesh.
     Haha,
+    /// glTF with KHR_gaussian_splatting.
+    Gltf,
 }
 
 impl Format {
@@ -48,6 +51,7 @@ impl Format {
             Self::Npz => "npz of canonical Gaussians",
             Self::Checkpoint => "torch checkpoint of Gaussians",
             Self::Haha => "HAHA checkpoint",
+            Self::Gltf => "glTF Gaussians (KHR_gaussian_splatting)",
         }
     }
 }
@@ -116,13 +120,15 @@ struct Reader {
 }
 
 /// Every format; the first that recognises a file reads it.
-const READERS: [Reader; 4] = [exported::READER, plain::READER, npz::READER, checkpoint::READER];
+const READERS: [Reader; 5] =
+    [exported::READER, plain::READER, npz::READER, checkpoint::READER, splats::READER];
 
-const EXPECTED: &str = "a 3DGS PLY, a SplattingAvatar export, an npz of Gaussians (README of skinsplat-data) or a torch \
-                        checkpoint of Gaussians";
+const EXPECTED: &str = "a 3DGS PLY, a SplattingAvatar export, an npz of Gaussians (README of skinsplat-data), a torch \
+                        checkpoint of Gaussians or a glTF file with KHR_gaussian_splatting";
 
 /// Reads an avatar: a PLY of Gaussians, an export of SplattingAvatar (`point_cloud.ply` with `embedding.json` beside it, or
-/// the folder that holds both), an `.npz` of canonical Gaussians, or a torch checkpoint.
+/// the folder that holds both), an `.npz` of canonical Gaussians, a torch checkpoint, or a glTF file with
+/// KHR_gaussian_splatting.
 ///
 /// # Errors
 /// A file of another format, by its name; a folder without an avatar; whatever the format's reader finds wrong.

@@ -29,6 +29,8 @@ pub(in super::super) struct Source {
     pub(super) size: usize,
     /// What has to be said of the document.
     pub(super) notes: Vec<String>,
+    /// The extensions that it requires.
+    pub(super) required: Vec<String>,
 }
 
 /// No encoded image of more bytes is read.
@@ -47,12 +49,12 @@ impl Source {
         let (json, blob) = text::split(&bytes).map_err(invalid)?;
         let named = |e: SceneError| Error::scene(path, e);
         let mut root = text::parse(&json).map_err(named)?;
-        let notes = text::check_extensions(&mut root).map_err(named)?;
+        let (required, notes) = text::check_extensions(&mut root).map_err(named)?;
         check_root(&root).map_err(named)?;
         let document = Document::from_json(root).map_err(invalid)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let size = bytes.len();
-        let mut source = Self { document, buffers: Vec::new(), folder, size, notes };
+        let mut source = Self { document, buffers: Vec::new(), folder, size, notes, required };
         source.buffers = source.load_buffers(blob).map_err(named)?;
         source.size += source.buffers.iter().map(Vec::len).sum::<usize>();
         Ok(source)
@@ -107,6 +109,13 @@ impl Source {
             Ok(bytes)
         };
         read().map_err(|e: io::Error| broken(format!("{}: {e}", path.display())))
+    }
+
+    /// The object of KHR_gaussian_splatting of a primitive.
+    pub(super) fn splat_extension(&self, primitive: &::gltf::Primitive<'_>) -> Option<serde_json::Value> {
+        let extras = primitive.extras().as_ref()?;
+        let mut extras: serde_json::Value = serde_json::from_str(extras.get()).ok()?;
+        extras.get_mut("KHR_gaussian_splatting").map(serde_json::Value::take)
     }
 
     /// The encoded bytes of an image.

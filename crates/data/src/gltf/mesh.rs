@@ -23,7 +23,8 @@ pub(super) fn collect(source: &Source, joints: &Joints, notes: &mut Vec<String>)
     let mut coordinates = Vec::new();
     for node in source.document.nodes() {
         let (Some(mesh), Some(skin)) = (node.mesh(), node.skin()) else { continue };
-        for primitive in mesh.primitives() {
+        // Gaussians are an avatar's, not the body's.
+        for primitive in mesh.primitives().filter(|primitive| !super::splats::is_splats(primitive)) {
             let part = Part {
                 source,
                 field: format!("meshes[{}].primitives[{}]", mesh.index(), primitive.index()),
@@ -52,10 +53,10 @@ pub(super) fn collect(source: &Source, joints: &Joints, notes: &mut Vec<String>)
 }
 
 /// A primitive and where it stands in the document.
-struct Part<'a> {
-    source: &'a Source,
-    field: String,
-    primitive: Primitive<'a>,
+pub(super) struct Part<'a> {
+    pub(super) source: &'a Source,
+    pub(super) field: String,
+    pub(super) primitive: Primitive<'a>,
 }
 
 impl Part<'_> {
@@ -117,7 +118,7 @@ impl Part<'_> {
     }
 
     /// JOINTS_n and WEIGHTS_n for n = 0, 1, …, with the skin's joint numbers replaced by the skeleton's.
-    fn influences(
+    pub(super) fn influences(
         &self,
         skin: &Skin,
         joints: &Joints,

@@ -4,9 +4,14 @@
 mod buffers;
 mod clip;
 mod mesh;
+mod splats;
 mod text;
+mod write;
 
 pub use clip::Clip;
+pub(crate) use splats::has_splats;
+pub use splats::{Splats, load_splats};
+pub use write::{Motion, write_body, write_skinned_splats, write_splats};
 
 use super::Error;
 use ::gltf::Node;

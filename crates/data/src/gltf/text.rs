@@ -13,7 +13,8 @@ const COMPRESSED: [(&str, &str); 3] = [
 ];
 
 /// Extensions that change nothing about where vertices are.
-const HARMLESS: [&str; 3] = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_animation_pointer"];
+const HARMLESS: [&str; 4] =
+    ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_animation_pointer", "KHR_gaussian_splatting"];
 const HARMLESS_PREFIXES: [&str; 5] =
     ["KHR_materials_", "KHR_lights_", "KHR_texture_", "EXT_texture_", "VRMC_"];
 
@@ -34,7 +35,9 @@ pub(super) fn parse(text: &[u8]) -> Result<Root, SceneError> {
     let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
     let broken = |e: serde_json::Error| SceneError::new("glTF", e.to_string(), "a glTF 2.0 document");
     let mut value: Value = serde_json::from_slice(text).map_err(broken)?;
-    let text = match drop_channels_without_node(&mut value) {
+    let dropped = drop_channels_without_node(&mut value);
+    let renamed = rename_splat_attributes(&mut value);
+    let text = match dropped || renamed {
         true => Cow::Owned(serde_json::to_vec(&value).map_err(broken)?),
         false => Cow::Borrowed(text),
     };
@@ -54,26 +57,56 @@ fn drop_channels_without_node(document: &mut Value) -> bool {
     dropped
 }
 
+/// Gives the attributes of KHR_gaussian_splatting the underscore that the `gltf` crate asks of names that it does not know, and
+/// puts the extension's object where it keeps it (`extras`). True if there are any.
+fn rename_splat_attributes(document: &mut Value) -> bool {
+    const EXTENSION: &str = "KHR_gaussian_splatting";
+    let mut renamed = false;
+    let meshes = document.get_mut("meshes").and_then(Value::as_array_mut).into_iter().flatten();
+    let primitives = meshes.filter_map(|mesh| mesh.get_mut("primitives")?.as_array_mut()).flatten();
+    for primitive in primitives {
+        let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) else {
+            continue;
+        };
+        let own = |name: &String| name.strip_prefix(EXTENSION).is_some_and(|rest| rest.starts_with(':'));
+        let names: Vec<String> = attributes.keys().filter(|name| own(name)).cloned().collect();
+        for name in &names {
+            if let Some(accessor) = attributes.remove(name) {
+                attributes.insert(format!("_{name}"), accessor);
+            }
+        }
+        if names.is_empty() {
+            continue;
+        }
+        renamed = true;
+        let object = primitive.get("extensions").and_then(|all| all.get(EXTENSION)).cloned();
+        if let (Some(object), Some(primitive)) = (object, primitive.as_object_mut()) {
+            primitive.insert("extras".to_owned(), serde_json::json!({ EXTENSION: object }));
+        }
+    }
+    renamed
+}
+
 /// Takes the list of required extensions out of the document, which the `gltf` crate would check against its own, and says
-/// which of them are not known.
+/// which of them are not known. Returns the list and the notes.
 ///
 /// # Errors
 /// Geometry that is compressed.
-pub(super) fn check_extensions(root: &mut Root) -> Result<Vec<String>, SceneError> {
+pub(super) fn check_extensions(root: &mut Root) -> Result<(Vec<String>, Vec<String>), SceneError> {
     let required = std::mem::take(&mut root.extensions_required);
     let known =
         |name: &str| HARMLESS.contains(&name) || HARMLESS_PREFIXES.iter().any(|p| name.starts_with(p));
     let mut notes = Vec::new();
-    for name in required {
-        if let Some((extension, title)) = COMPRESSED.iter().find(|(extension, _)| *extension == name) {
+    for name in &required {
+        if let Some((extension, title)) = COMPRESSED.iter().find(|(extension, _)| extension == name) {
             let problem = format!("{extension}: geometry compressed with {title}, which is not read");
             let expected = "an uncompressed file (gltf-transform: `copy` undoes it)";
             return Err(SceneError::new("extensionsRequired", problem, expected));
         }
-        if !known(&name) {
+        if !known(name) {
             let shown: String = name.chars().take(80).collect();
             notes.push(format!("it requires the extension {}, which is not read", shown.escape_debug()));
         }
     }
-    Ok(notes)
+    Ok((required, notes))
 }

@@ -49,6 +49,9 @@ pub enum RotationChoice {
     /// The normalised sum of the joints' quaternions with signs that belong together ([`JointLift`]): as the average for
     /// nearby joints, and continuous where that jumps.
     LiftedSum,
+    /// The normalised sum of the joints' quaternions with w ≥ 0 each, signs not aligned: what an engine does that sums
+    /// quaternions as its matrices give them. Wrong where two of them end in opposite hemispheres.
+    JointSum,
     /// The rotation nearest to J, the derivative of LBS with its weights' gradients: the rotation of the posed surface.
     PushForward(Across),
     /// Dual-quaternion blending; the mean of a Gaussian with weights of its own follows it too.
@@ -148,6 +151,11 @@ named_rotations![
     ),
     ("lifted-sum", "joint quaternions summed with signs that belong together: no jump at 180°", LiftedSum),
     (
+        "sum-w",
+        "joint quaternions summed with w at least 0 each, signs not aligned: an engine's mistake",
+        JointSum
+    ),
+    (
         "push-forward",
         "the rotation nearest to J, the derivative of LBS with its weights' gradients",
         PushForward(Across::Constant)
@@ -176,7 +184,11 @@ impl RotationChoice {
             | Self::VertexAverage(_)
             | Self::VertexQuaternions(_)
             | Self::PushForward(_) => true,
-            Self::Lbs(_) | Self::QuaternionAverage(_) | Self::LiftedSum | Self::DualQuaternion => false,
+            Self::Lbs(_)
+            | Self::QuaternionAverage(_)
+            | Self::LiftedSum
+            | Self::JointSum
+            | Self::DualQuaternion => false,
         }
     }
 
@@ -190,6 +202,7 @@ impl RotationChoice {
             | Self::VertexAverage(_)
             | Self::VertexQuaternions(_)
             | Self::PushForward(_)
+            | Self::JointSum
             | Self::LiftedSum => false,
         }
     }
@@ -281,6 +294,11 @@ impl<'a> Source<'a> {
                 let vertices = VertexRotations::summed(policy, body, surface);
                 Self::per_block(move |input| vertices.of_block(input))
             }),
+            RotationChoice::JointSum => {
+                let positive = |q: &Quaternion<f64>| SignPolicy::NonNegativeW.apply(*q, *q);
+                let quaternions: Vec<Quaternion<f64>> = joints.rotation_f64.iter().map(positive).collect();
+                Self::per_block(move |input| lifted::summed(&quaternions, input))
+            }
             RotationChoice::LiftedSum => {
                 let lift = lift.map_or_else(|| Cow::Owned(JointLift::from_rest(body)), Cow::Borrowed);
                 Self::per_block(move |input| lifted::summed(lift.quaternions(), input))
