@@ -55,7 +55,12 @@ impl<'a> Frame<'a> {
     ) -> Result<Scored, Error> {
         let drawn = drawable.draw(&self.view, look, scratch)?;
         let start = Instant::now();
-        let truth = skinsplat_metrics::Truth::Straight { rgb: &self.truth.rgb, alpha: &self.truth.alpha };
+        let alpha = &self.truth.alpha;
+        #[cfg(feature = "faults")]
+        let faulty = super::faults::of_scoring(protocol, alpha);
+        #[cfg(feature = "faults")]
+        let (protocol, alpha) = (&*faulty.0, &*faulty.1);
+        let truth = skinsplat_metrics::Truth::Straight { rgb: &self.truth.rgb, alpha };
         let wanted = Wanted { avatar: AvatarStats { gaussians: drawn.splats }, ..wanted };
         let score = protocol.score_with(&drawn.image, truth, wanted)?;
         Ok(Scored { score, drawn, score_seconds: start.elapsed().as_secs_f64() })

@@ -5,6 +5,8 @@
 mod files;
 #[path = "../support/program.rs"]
 mod program;
+#[path = "../support/schema.rs"]
+mod schema;
 #[path = "../support/mod.rs"]
 mod support;
 
@@ -16,6 +18,7 @@ mod bad_plans;
 mod blending;
 mod bodies_of_tables;
 mod catalogues;
+mod comparing;
 mod fitting;
 mod foreign_avatars;
 mod foreign_bodies;
