@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 const MODULES: [&str; 4] = ["datasets", "experiment", "run", "report"];
 
 /// The crates, and what each may be built on. Tests and examples may use more.
-const CRATES: [(&str, &[&str]); 14] = [
+const CRATES: [(&str, &[&str]); 15] = [
     ("core", &[]),
     ("simd", &[]),
     ("table", &[]),
     ("plot", &[]),
+    ("page", &["table"]),
     ("lpips-alex", &[]),
     ("posing", &["core", "simd"]),
     ("render", &["core", "simd"]),
@@ -23,11 +24,14 @@ const CRATES: [(&str, &[&str]); 14] = [
     ("synthetic", &["core", "data", "render"]),
     ("check", &["core", "data", "render"]),
     ("fit", &["core", "simd", "data", "posing", "render"]),
-    ("study", &["core", "simd", "data", "fit", "metrics", "plot", "posing", "render", "synthetic", "table"]),
+    (
+        "study",
+        &["core", "simd", "data", "fit", "metrics", "page", "plot", "posing", "render", "synthetic", "table"],
+    ),
 ];
 
 /// Libraries that belong to one place: everything else stays free of them.
-const HOMES: [(&str, &[&str]); 10] = [
+const HOMES: [(&str, &[&str]); 13] = [
     ("clap::", &["src/cli"]),
     ("indicatif::", &["src/cli"]),
     ("anyhow::", &["src/cli"]),
@@ -38,6 +42,9 @@ const HOMES: [(&str, &[&str]); 10] = [
     ("zip::", &["crates/data"]),
     ("half::", &["crates/data", "crates/study"]),
     ("plotters::", &["crates/plot"]),
+    ("maud::", &["crates/page"]),
+    ("gif::", &["src/run/pictures.rs"]),
+    ("quick_junit::", &["src/report"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

@@ -196,7 +196,8 @@ fn the_embedded_registry_names_what_is_there() {
     let registry = Registry::embedded();
     let available: Vec<&str> =
         registry.datasets.iter().filter(|d| d.is_available()).map(|d| d.id.as_str()).collect();
-    let shipped = ["synthetic", "synthetic_arm", "snapshot_ava", "multiview_ben", "xhands_ava"];
+    let shipped =
+        ["synthetic", "synthetic_arm", "synthetic_small", "snapshot_ava", "multiview_ben", "xhands_ava"];
     assert_eq!(available[..5], shipped);
     for id in &shipped[2..] {
         let dataset = registry.get(id).unwrap();

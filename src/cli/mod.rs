@@ -2,6 +2,7 @@
 
 mod blend;
 mod check;
+mod compare;
 mod completions;
 mod conform;
 mod data;
@@ -13,6 +14,7 @@ mod inspect;
 mod list;
 mod lpips;
 mod output;
+mod page;
 mod plan;
 mod planning;
 mod posing;
@@ -56,6 +58,7 @@ enum Command {
     Run(run::Run),
     Plan(plan::Plan),
     Report(report::Report),
+    Compare(compare::Compare),
     List(list::List),
     Check(check::Check),
     FetchHelp(fetch_help::FetchHelp),
@@ -140,6 +143,7 @@ impl Command {
             Self::Run(command) => command.run(context),
             Self::Plan(command) => command.run(),
             Self::Report(command) => command.run(context),
+            Self::Compare(command) => command.run(context),
             Self::List(command) => command.run(),
             Self::Check(command) => command.run(context),
             Self::FetchHelp(command) => command.run(),

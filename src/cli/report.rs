@@ -1,32 +1,47 @@
 //! `reproduce report`: the tables of a run again, or against a baseline.
 
-use super::output::{emit, emit_json, table_format, written};
-use super::tolerances::ToleranceOptions;
+use super::compare::{Comparing, folder, load};
+use super::output::{emit, written};
+use super::page::{Images, page, write_page};
+use super::run::stores;
 use super::{Context, Exit};
-use anyhow::{Context as _, Result, anyhow};
-use skinsplat::report::compare::{Changes, Move, compare};
+use anyhow::{Result, anyhow};
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use skinsplat::report::{self, Results};
-use std::path::{Path, PathBuf};
+use skinsplat::run::store;
+use skinsplat_data::atomic;
+use skinsplat_table::{FORMATS, to_json};
+use std::io::Write;
+use std::path::PathBuf;
 
-/// Print the tables of a run again, or compare them with a baseline.
+/// Print the tables of a run again.
 ///
-/// With --baseline the exit code is 1 if a sequence got worse by more than the tolerances.
+/// With --baseline it is `reproduce compare BASELINE RUN`, with the same exit codes.
 #[derive(Debug, clap::Args)]
 pub(super) struct Report {
     /// Folder of a run, or its results.json
     #[arg(value_name = "RUN", default_value = super::run::DEFAULT_OUT)]
     run: PathBuf,
     /// How to print the tables
-    #[arg(long, value_name = "FORMAT", value_parser = table_format(), default_value = "markdown")]
+    #[arg(long, value_name = "FORMAT", value_parser = formats(), default_value = "markdown")]
     format: String,
+    /// Write to a file [default: standard output]
+    #[arg(long, value_name = "FILE", conflicts_with = "baseline")]
+    out: Option<PathBuf>,
+    /// Which of the pictures that the run kept (`run --images`) a page shows
+    #[arg(long, value_enum, value_name = "WHICH", default_value_t = Images::All)]
+    images: Images,
+    /// Where the time of the frames went, instead of the tables
+    #[arg(long, conflicts_with = "baseline")]
+    timing: bool,
     /// Only this table
     #[arg(long, value_name = "EXPERIMENT")]
     table: Option<String>,
-    /// Folder of an earlier run, or its results.json: print what moved
+    /// Folder of an earlier run, or its results.json: print what moved, as `reproduce compare` does
     #[arg(long, value_name = "RUN", help_heading = "Comparison")]
     baseline: Option<PathBuf>,
     #[command(flatten)]
-    tolerances: ToleranceOptions,
+    comparing: Comparing,
 }
 
 impl Report {
@@ -40,54 +55,44 @@ impl Report {
             }
         }
         if let Some(baseline) = &self.baseline {
-            return self.compare(&load(baseline)?, &results, context);
+            let changes = self.comparing.compare(&load(baseline)?, &results)?;
+            return self.comparing.print(&changes, &self.format, context);
         }
-        let tables = results.tables.iter().map(|table| &table.table);
-        match self.format.as_str() {
-            // With what is said around the tables, as in tables.md.
-            "markdown" => emit(&report::page(&results))?,
-            // One document.
-            "json" => emit_json(&tables.collect::<Vec<_>>())?,
-            format => emit(&tables.map(|table| written(table, format)).collect::<Vec<_>>().join("\n"))?,
+        let text = if self.timing { self.timing(&results)? } else { self.tables(&results)? };
+        match &self.out {
+            Some(path) if self.format == HTML => write_page(path, &text, context)?,
+            Some(path) => atomic::write(path, |w| w.write_all(text.as_bytes()))?,
+            None => emit(&text)?,
         }
         Ok(if results.missing() > 0 { Exit::Incomplete } else { Exit::Success })
     }
 
-    fn compare(&self, baseline: &Results, candidate: &Results, context: Context) -> Result<Exit> {
-        let changes = compare(baseline, candidate, &self.tolerances.0);
-        match self.format.as_str() {
-            "json" => emit_json(&changes)?,
-            _ => emit(&text(&changes))?,
-        }
-        context.note(format!("{} sequences and variants compared", changes.compared));
-        Ok(if changes.verdict.is_good() { Exit::Success } else { Exit::Failed })
+    /// The tables in the wanted format.
+    fn tables(&self, results: &Results) -> Result<String> {
+        let tables = results.tables.iter().map(|table| &table.table);
+        Ok(match self.format.as_str() {
+            // With what is said around the tables, as in tables.md.
+            "markdown" => report::page(results),
+            HTML => page(results, folder(&self.run), self.images)?,
+            // One document.
+            "json" => to_json(&tables.collect::<Vec<_>>()),
+            format => tables.map(|table| written(table, format)).collect::<Vec<_>>().join("\n"),
+        })
+    }
+
+    fn timing(&self, results: &Results) -> Result<String> {
+        let records = store::merge(stores(folder(&self.run))?.iter().map(PathBuf::as_path))?;
+        let table = report::timing::phases(results, &records);
+        let format = if self.format == HTML { "markdown" } else { &self.format };
+        Ok(written(&table, format))
     }
 }
 
-/// Frames of a comparison that are worth a line.
-const FRAMES_SHOWN: usize = 10;
+/// The format of pages, beside those of tables.
+const HTML: &str = "html";
 
-fn text(changes: &Changes) -> String {
-    let line = |m: &Move| format!("  {} {}: {} -> {}\n", m.at, m.metric.id(), m.baseline, m.candidate);
-    let mut text = format!("verdict: {:?}\n", changes.verdict).to_lowercase();
-    for (title, moves) in [
-        ("sequences that moved", &changes.sequences[..]),
-        ("frames that moved most", &changes.frames[..changes.frames.len().min(FRAMES_SHOWN)]),
-    ] {
-        if !moves.is_empty() {
-            text += &format!("{title}:\n{}", moves.iter().map(line).collect::<String>());
-        }
-    }
-    for (title, names) in [("lost", &changes.lost), ("new", &changes.gained)] {
-        if !names.is_empty() {
-            text += &format!("{title}: {}\n", names.join(", "));
-        }
-    }
-    text
-}
-
-fn load(path: &Path) -> Result<Results> {
-    let file = if path.is_dir() { path.join("results.json") } else { path.to_owned() };
-    let text = std::fs::read_to_string(&file).with_context(|| format!("{}: cannot read", file.display()))?;
-    Results::from_json(&text).map_err(|problem| anyhow!("{}: {problem}", file.display()))
+fn formats() -> PossibleValuesParser {
+    let html = PossibleValue::new(HTML).help("one page for a browser, with charts and pictures");
+    let tables = FORMATS.iter().map(|format| PossibleValue::new(format.id).help(format.about));
+    PossibleValuesParser::new(tables.chain([html]).collect::<Vec<_>>())
 }

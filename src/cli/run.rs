@@ -1,6 +1,7 @@
 //! `reproduce run`: the main job.
 
 use super::output::emit;
+use super::page::{Images, PICTURES, page, write_page};
 use super::planning::{Planned, Planning};
 use super::{Context, Exit, progress::Watch};
 use anyhow::{Context as _, Result};
@@ -8,6 +9,7 @@ use skinsplat::experiment::{Records, Shard, Unreadable};
 use skinsplat::report;
 use skinsplat::run::gallery;
 use skinsplat::run::motion::{self, Motion};
+use skinsplat::run::pictures;
 use skinsplat::run::provenance::Provenance;
 use skinsplat::run::store::{self, FILE_NAME, Store};
 use skinsplat::run::{self, Error};
@@ -37,9 +39,13 @@ pub(super) struct Run {
     /// Only this slice of the frames, counted from 1
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Also write images/: where the variants differ most, truth and variants side by side with their errors
-    #[arg(long, conflicts_with = "shard")]
-    images: bool,
+    /// Also write images/: where the variants differ most, truth and variants side by side with their errors; and pictures/: single
+    /// pictures of those frames (key), or of every frame (all), for pages and comparisons [default with --html: key]
+    #[arg(long, value_name = "WHICH", num_args = 0..=1, default_missing_value = "key", conflicts_with = "shard")]
+    images: Option<Images>,
+    /// Also write the results as one page for a browser, with pictures to compare: below 15 MB
+    #[arg(long, value_name = "FILE", conflicts_with = "shard")]
+    html: Option<PathBuf>,
     /// Also write motion/: the avatars of every variant under a motion (smplx, AMASS or AIST++ .npz or .pkl, transforms.json,
     /// .glb or .gltf), as motion/TABLE/SUBJECT/VARIANT/frame_0000.png. Each keeps its shape, starts where the first test frame
     /// of its row has it, and is seen by that frame's camera. Nothing is scored: no true images exist
@@ -62,7 +68,8 @@ Examples:
   reproduce run table3 --all-strategies          one table, a row per strategy
   reproduce run --data DIR --profile standard    all tables on the subjects of a folder
   reproduce run my.toml --out runs/mine          a table of your own
-  reproduce run table3 --motion dance.npz        Table 3, and its avatars dancing";
+  reproduce run table3 --motion dance.npz        Table 3, and its avatars dancing
+  reproduce run table1 --html table1.html        Table 1 as a page with pictures";
 
 impl Run {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
@@ -130,9 +137,10 @@ impl Run {
         self.write_curves(planned)?;
         self.write_bend(&results)?;
         write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
-        if self.images {
+        if self.images.is_some_and(|which| which != Images::None) {
             self.write_images(planned, &records, context)?;
         }
+        self.write_page(planned, &records, &results, context)?;
         if let Some(motion) = motion {
             self.write_motion(planned, motion, context)?;
         }
@@ -197,6 +205,28 @@ impl Run {
             context.note(note);
         }
         Ok(Some(motion))
+    }
+
+    /// The pictures that the page shows, and the page.
+    fn write_page(
+        &self,
+        Planned { plan, library, .. }: &Planned,
+        records: &Records,
+        results: &report::Results,
+        context: Context,
+    ) -> Result<()> {
+        let images = self.images.unwrap_or(if self.html.is_some() { Images::Key } else { Images::None });
+        if images != Images::None {
+            let watch = Watch::new(context.quiet);
+            let (avatars, folder) = (self.out.join(AVATARS), self.out.join(PICTURES));
+            pictures::write(plan, library, records, images.keep(), &avatars, &folder, &|event| {
+                watch.see(event)
+            })?;
+        }
+        match &self.html {
+            Some(path) => write_page(path, &page(results, &self.out, images)?, context),
+            None => Ok(()),
+        }
     }
 
     fn write_motion(

@@ -5,13 +5,13 @@ use super::progress::Watch;
 use super::{Context, Exit};
 use anyhow::{Context as _, Result};
 use skinsplat_data::{atomic, frames};
-use skinsplat_study::stress::{Report, Section};
+use skinsplat_study::stress::{self, Report, Section};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Try every strategy and solver on inputs that are hard on purpose, and say what holds, degrades and breaks.
 ///
-/// Needs no data. Writes stress.md, stress.csv (a line per input), stress.json and pictures of what breaks visibly, and
+/// Needs no data. Writes stress.md, stress.html, stress.csv (a line per input), stress.json and pictures of what breaks visibly, and
 /// prints the Markdown.
 #[derive(Debug, clap::Args)]
 pub(super) struct Stress {
@@ -60,6 +60,12 @@ impl Stress {
         for picture in &report.pictures {
             frames::save_png(&out.join(&picture.file), &picture.image)?;
         }
+        let shown = report.pictures.iter().map(|picture| {
+            let path = out.join(&picture.file);
+            std::fs::read(&path).with_context(|| format!("{}: cannot read", path.display()))
+        });
+        let html = stress::page(&report, &shown.collect::<Result<Vec<_>>>()?).html();
+        write(&out.join("stress.html"), &html)?;
         let markdown = report.markdown();
         write(&out.join("stress.csv"), &report.csv())?;
         write(&out.join("stress.json"), &report.json())?;

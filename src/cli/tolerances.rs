@@ -1,12 +1,12 @@
 //! `--tolerance-METRIC` for every metric of [`MetricId::all`].
 
-use clap::{Arg, ArgMatches, Args, Command, Error, FromArgMatches, value_parser};
-use skinsplat::report::compare::Tolerances;
+use clap::{Arg, ArgMatches, Args, Command, Error, FromArgMatches};
+use skinsplat::report::compare::Allowed;
 use skinsplat_metrics::MetricId;
 
-/// How far numbers may move, by options that are named after the metrics.
+/// How far numbers may move, by options that are named after the metrics; what was not given is not in it.
 #[derive(Debug)]
-pub(super) struct ToleranceOptions(pub(super) Tolerances);
+pub(super) struct ToleranceOptions(pub(super) Allowed);
 
 fn name(metric: MetricId) -> String {
     format!("tolerance-{}", metric.id())
@@ -20,10 +20,16 @@ fn option(metric: MetricId) -> Arg {
     Arg::new(name(metric))
         .long(name(metric))
         .value_name(value_name)
-        .value_parser(value_parser!(f64))
-        .default_value(known.tolerance.to_string())
-        .help(format!("{} that may be {worse}{unit}", known.title))
+        .value_parser(tolerance)
+        .help(format!("{} that may be {worse}{unit} [default: {}]", known.title, known.tolerance))
         .help_heading("Comparison")
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value >= 0.0 => Ok(value),
+        _ => Err("expected a number that is not negative, or inf".to_owned()),
+    }
 }
 
 impl Args for ToleranceOptions {
@@ -38,8 +44,8 @@ impl Args for ToleranceOptions {
 
 impl FromArgMatches for ToleranceOptions {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
-        let given = |metric| matches.get_one(&name(metric)).copied().unwrap_or_default();
-        Ok(Self(Tolerances::each(given)))
+        let given = |metric| Some((metric, *matches.get_one(&name(metric))?));
+        Ok(Self(Allowed(MetricId::all().filter_map(given).collect())))
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {

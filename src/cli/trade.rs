@@ -23,7 +23,7 @@ const DEFAULT_SUBJECT: &str = "synthetic/ring_stripes";
 ///
 /// Solvers, influences, precision, strategies, colour, storage, splats, cut-offs, resolution, many avatars: everything is
 /// measured in one run on one avatar, in the subject's test motion and in one whose joints are turned by nearly 180 degrees.
-/// Then what leaving out the unneeded saves, on a built-in subject. Writes trade.md, trade.csv, trade.json and a plot of time
+/// Then what leaving out the unneeded saves, on a built-in subject. Writes trade.md, trade.html, trade.csv, trade.json and a plot of time
 /// against error per table and motion, and ends with a recommendation for offline scoring, real-time engines and browsers.
 /// Times are of one thread: run it on an idle machine. Everything but times is the same from run to run.
 #[derive(Debug, clap::Args)]
@@ -182,6 +182,7 @@ impl Trading {
         let page = trade::markdown(result, &pictures);
         save("trade.csv", trade::csv(result).as_bytes())?;
         save("trade.json", trade::json(result).as_bytes())?;
+        save("trade.html", trade::html(result, sweeps).as_bytes())?;
         save("trade.md", page.as_bytes())?;
         Ok(page)
     }

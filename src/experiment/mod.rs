@@ -37,7 +37,7 @@ pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
 pub use plan::{Job, JobVariant, Plan, PlannedTable, plan};
 pub use profile::{GivenWeights, Options, Profile, Subset};
 pub use record::{FrameRecord, Outcome, Records, Seconds};
-pub use rows::{DataRow, Source};
+pub use rows::{DataRow, RowDigests, Source};
 pub use seeds::Replicate;
 pub use shard::Shard;
 pub use spec::{

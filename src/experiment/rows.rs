@@ -35,6 +35,18 @@ pub struct DataRow {
     pub train: Option<(String, Vec<usize>)>,
     /// Why the row has no frames, if it has none.
     pub missing: Option<String>,
+    /// Digests of the test and the training sequence, if there is data. The keys of the jobs hold them already.
+    #[serde(skip)]
+    pub data: Option<RowDigests>,
+}
+
+/// Digests of the data of a row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RowDigests {
+    /// Of the test sequence.
+    pub test: String,
+    /// Of the training sequence, if the subject has one.
+    pub train: Option<String>,
 }
 
 /// The rows of an experiment: of its own data set if that is there, else of every subject that may stand in.
@@ -105,6 +117,7 @@ fn own_rows(experiment: &Experiment, dataset: &Dataset, options: &Options) -> Ve
                 frames: Vec::new(),
                 train: None,
                 missing: Some(missing),
+                data: None,
             });
         }
         rows.extend(found);
@@ -192,6 +205,7 @@ fn data_row(
         Some((_, frames)) if frames.is_empty() => none_of("training"),
         _ => None,
     };
+    let train_digest = train.as_ref().map(|(sequence, _)| sequence.digest.clone());
     let thin = |frames: Vec<usize>| evenly_spaced(&frames, options.profile.max_train_frames);
     DataRow {
         id: format!("{}/{}/{}", dataset.registered_id(), subject.id, test.id),
@@ -202,5 +216,6 @@ fn data_row(
         frames,
         train: train.map(|(sequence, frames)| (sequence.id.clone(), thin(frames))),
         missing,
+        data: Some(RowDigests { test: test.digest.clone(), train: train_digest }),
     }
 }

@@ -1,7 +1,9 @@
 //! Records to results: what each planned frame became, and the protocol's aggregate of each sequence.
 
 use super::captions::avatar_file;
-use super::results::{FrameResult, Results, SCHEMA, SequenceResults, TableResults, VariantResults};
+use super::results::{
+    DataDigests, FrameResult, Results, SCHEMA, SequenceResults, TableResults, VariantResults,
+};
 use super::{Error, build, paper};
 use crate::experiment::{
     CodeVersions, DataRow, Experiment, Job, Outcome, Plan, PlannedTable, Records, Variant,
@@ -91,6 +93,7 @@ fn sequence(
         id: row.id.clone(),
         label: row.label.clone(),
         missing: row.missing.clone(),
+        data: row.data.as_ref().map(|of| DataDigests { test: of.test.clone(), train: of.train.clone() }),
         variants: variants.iter().map(of_variant).collect::<Result<_, _>>()?,
     })
 }

@@ -4,7 +4,7 @@
 //! Plan + Records ─ results() ─► Results ─┬─ to_json()            results.json
 //!                                        ├─ page()               tables.md
 //!                                        ├─ Table                one of each format of `skinsplat_table`
-//!                                        └─ compare(baseline)    verdict, frames that moved
+//!                                        └─ compare(baseline)    verdicts, frames that moved
 //! ```
 //!
 //! A [`Table`](skinsplat_table::Table) is the one value that every format prints. Missing frames are counted and named, a metric that was not
@@ -19,20 +19,25 @@ pub mod compare;
 mod comparison;
 mod curves;
 mod differences;
+pub mod html;
 mod layout;
 mod markdown;
 mod page;
 mod paper;
 mod replicates;
 mod results;
+pub mod timing;
 
 pub use bend::{bend_csv, bend_plots};
+pub use crate::run::gallery::picture_name;
 pub use collect::results;
 pub use comparison::{Comparison, MetricDifference};
 pub use curves::{curve_plots, curves_csv};
 pub use markdown::markdown;
 pub use page::page;
-pub use results::{FrameResult, Results, SCHEMA, SequenceResults, TableResults, VariantResults};
+pub use results::{
+    DataDigests, FrameResult, OLDEST_SCHEMA, Results, SCHEMA, SequenceResults, TableResults, VariantResults,
+};
 
 use skinsplat_metrics::MetricsError;
 

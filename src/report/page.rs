@@ -40,7 +40,7 @@ fn given_avatar(recipe: &AvatarRecipe) -> Option<String> {
 }
 
 /// The command that makes these tables again, from the same data.
-fn command(results: &Results) -> String {
+pub(super) fn command(results: &Results) -> String {
     let Options { profile, subset, lpips_weights } = &results.options;
     let mut words = vec!["reproduce run".to_owned()];
     words.extend(results.tables.iter().map(|table| table.experiment.clone()));

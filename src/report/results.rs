@@ -8,13 +8,16 @@ use skinsplat_metrics::{FrameScore, MetricId, ProtocolId, Summary};
 use skinsplat_table::{Digits, Table, to_json};
 
 /// Version of the document's format.
-pub const SCHEMA: u32 = 3;
+pub const SCHEMA: u32 = 4;
+
+/// The oldest version that this program reads.
+pub const OLDEST_SCHEMA: u32 = 3;
 
 /// Everything that a run found out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Results {
-    /// Version of the format: [`SCHEMA`].
+    /// Version of the format: [`SCHEMA`], or an earlier one that was read.
     pub schema: u32,
     /// Digest of the plan.
     pub plan: String,
@@ -43,8 +46,9 @@ impl Results {
             schema: u32,
         }
         let versioned: Versioned = serde_json::from_str(text).map_err(|error| error.to_string())?;
-        if versioned.schema != SCHEMA {
-            return Err(format!("schema: {}; expected {SCHEMA}, which this program reads", versioned.schema));
+        if !(OLDEST_SCHEMA..=SCHEMA).contains(&versioned.schema) {
+            let expected = format!("{OLDEST_SCHEMA} to {SCHEMA}, which this program reads");
+            return Err(format!("schema: {}; expected {expected}", versioned.schema));
         }
         let results: Self = serde_json::from_str(text).map_err(|error| error.to_string())?;
         results.tables.iter().try_for_each(TableResults::check)?;
@@ -108,8 +112,21 @@ pub struct SequenceResults {
     pub label: String,
     /// Why there are no frames, if there are none.
     pub missing: Option<String>,
+    /// What it was made from; none without data, or before schema 4.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub data: Option<DataDigests>,
     /// In the order of the experiment.
     pub variants: Vec<VariantResults>,
+}
+
+/// Digests of the data behind a sequence: equal digests, equal images, cameras, poses and bodies.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataDigests {
+    /// Of the test sequence.
+    pub test: String,
+    /// Of the training sequence; none if the subject has none.
+    pub train: Option<String>,
 }
 
 /// A variant on a sequence.

@@ -74,10 +74,13 @@ pub enum Behind<'a> {
 impl Behind<'_> {
     /// The colour to draw over; black under a picture, which is added afterwards.
     fn colour(self) -> [f32; 3] {
-        match self {
+        let colour = match self {
             Self::Colour(colour) => colour,
             Self::Picture(_) => [0.0; 3],
-        }
+        };
+        #[cfg(feature = "faults")]
+        let colour = super::faults::of_background(colour);
+        colour
     }
 
     /// Straight colours with alpha over what is behind.
@@ -156,6 +159,8 @@ impl Drawable<'static> {
 
 impl Bound {
     fn new(avatar: &Avatar, body: &RestBody) -> Result<Self, Error> {
+        #[cfg(feature = "faults")]
+        let avatar = &*super::faults::of_avatar(avatar);
         Ok(Self { avatar: BoundAvatar::new(avatar, body)?.without_zero_bands(), body: None })
     }
 }
@@ -234,12 +239,17 @@ fn draw_gaussians(
     let options = PoseOptions { seen_by: Some(view.camera), ..PoseOptions::default() };
     let posed = poser.pose(avatar, own.as_ref().unwrap_or(&view.body), &strategy, &options)?;
     let pose_seconds = start.elapsed().as_secs_f64();
+    let camera = view.camera;
+    #[cfg(feature = "faults")]
+    let faulty = super::faults::of_drawing(posed, camera);
+    #[cfg(feature = "faults")]
+    let (posed, camera) =
+        faulty.as_ref().map_or((posed, camera), |(posed, camera)| (posed.as_posed(), camera));
     let start = Instant::now();
     let drawing = mesh.map(|mesh| mesh.drawing(view.pose, view.camera, SamplePattern::new(SAMPLES)));
     let drawing = drawing.transpose()?;
     let underlay = drawing.as_ref().map(Drawing::underlay);
-    let image =
-        look.background.under(renderer.render(&posed, &look.at(view.camera).with_underlay(underlay))?);
+    let image = look.background.under(renderer.render(&posed, &look.at(camera).with_underlay(underlay))?);
     Ok(Drawn {
         image,
         splats: Some(posed.len() as u64),

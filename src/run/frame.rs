@@ -65,7 +65,12 @@ impl<'a> Frame<'a> {
             false => None,
         };
         let start = Instant::now();
-        let truth = skinsplat_metrics::Truth::Straight { rgb: &self.truth.rgb, alpha: &self.truth.alpha };
+        let alpha = &self.truth.alpha;
+        #[cfg(feature = "faults")]
+        let faulty = super::faults::of_scoring(protocol, alpha);
+        #[cfg(feature = "faults")]
+        let (protocol, alpha) = (&*faulty.0, &*faulty.1);
+        let truth = skinsplat_metrics::Truth::Straight { rgb: &self.truth.rgb, alpha };
         let wanted = Wanted { avatar: AvatarStats { gaussians: drawn.splats }, bend, ..wanted };
         let score = protocol.score_with(&drawn.image, truth, wanted)?;
         Ok(Scored { score, drawn, score_seconds: start.elapsed().as_secs_f64() })

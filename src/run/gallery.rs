@@ -56,7 +56,7 @@ pub fn write(
             Behind::Picture(_) => frame.truth.rgb.clone(),
         };
         let table = &plan.tables[job.table];
-        let name = file_name(&format!("{}-{}-{}", table.experiment, table.rows[job.row].label, job.name));
+        let name = picture_name(&table.experiment, &table.rows[job.row].label, &job.name);
         save_png(&folder.join(&name), &strip(&truth, &images, &frame.truth.alpha)?)?;
         let variants: Vec<&str> = job.variants.iter().map(|variant| variant.id.as_str()).collect();
         let caption = format!("{} {} {}", table.experiment, table.rows[job.row].label, job.name);
@@ -68,20 +68,9 @@ pub fn write(
 
 /// Per table and sequence, the first job with the widest spread of PSNR.
 fn most_telling<'a>(plan: &'a Plan, records: &Records) -> Vec<&'a Job> {
-    let spread = |job: &Job| {
-        let psnr = |key: &str| match &records.get(key)?.outcome {
-            Outcome::Scored { score, .. } => score.value(MetricId::PSNR),
-            Outcome::Error(_) => None,
-        };
-        let scores: Option<Vec<f64>> = job.variants.iter().map(|variant| psnr(&variant.key)).collect();
-        let scores = scores?;
-        let high = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let low = scores.iter().copied().fold(f64::INFINITY, f64::min);
-        (high - low).is_finite().then_some(high - low)
-    };
     let mut best: Vec<(&Job, f64)> = Vec::new();
     for job in &plan.jobs {
-        let Some(spread) = spread(job) else { continue };
+        let Some(spread) = spread(job, records) else { continue };
         match best.last_mut() {
             Some((last, widest)) if (last.table, last.row) == (job.table, job.row) => {
                 if spread > *widest {
@@ -92,6 +81,24 @@ fn most_telling<'a>(plan: &'a Plan, records: &Records) -> Vec<&'a Job> {
         }
     }
     best.into_iter().map(|(job, _)| job).collect()
+}
+
+/// How far the PSNR of the variants lie apart on a frame; none if one was not scored or is infinite.
+pub(super) fn spread(job: &Job, records: &Records) -> Option<f64> {
+    let psnr = |key: &str| match &records.get(key)?.outcome {
+        Outcome::Scored { score, .. } => score.value(MetricId::PSNR),
+        Outcome::Error(_) => None,
+    };
+    let scores: Option<Vec<f64>> = job.variants.iter().map(|variant| psnr(&variant.key)).collect();
+    let scores = scores?;
+    let high = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let low = scores.iter().copied().fold(f64::INFINITY, f64::min);
+    (high - low).is_finite().then_some(high - low)
+}
+
+/// The file, in the folder of pictures, of a frame: experiment, label of the sequence, name of the frame.
+pub fn picture_name(experiment: &str, sequence: &str, frame: &str) -> String {
+    file_name(&format!("{experiment}-{sequence}-{frame}"))
 }
 
 /// Letters, digits and dashes.
@@ -126,7 +133,7 @@ fn strip(truth: &Image, variants: &[Image], alpha: &Mask) -> Result<Image, Scene
 }
 
 /// The subject's bounding box with a margin (x from, x to, y from, y to; half open); the whole image if it is empty.
-fn crop(alpha: &Mask) -> [usize; 4] {
+pub(super) fn crop(alpha: &Mask) -> [usize; 4] {
     let (width, height) = (alpha.width(), alpha.height());
     let inside = |x: usize, y: usize| alpha.at(x, y) > 0.5;
     let columns: Vec<usize> = (0..width).filter(|&x| (0..height).any(|y| inside(x, y))).collect();

@@ -6,7 +6,7 @@
 //! draws them in poses that no frame has.
 //!
 //! Each file imports only from those before it in this list: `textured`, `foreign`, `drawable`, `library`, `frame`,
-//! `held_out`, `cache`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`, `motion`.
+//! `held_out`, `cache`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`, `pictures`, `motion`.
 
 mod avatars;
 pub mod cache;
@@ -15,6 +15,8 @@ pub mod curves;
 pub mod drawable;
 mod error;
 mod execute;
+#[cfg(feature = "faults")]
+pub mod faults;
 pub mod fitting;
 pub mod foreign;
 mod frame;
@@ -22,6 +24,7 @@ pub mod gallery;
 pub mod held_out;
 mod library;
 pub mod motion;
+pub mod pictures;
 pub mod provenance;
 pub mod renders;
 pub mod store;

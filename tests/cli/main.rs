@@ -5,6 +5,8 @@
 mod files;
 #[path = "../support/program.rs"]
 mod program;
+#[path = "../support/schema.rs"]
+mod schema;
 #[path = "../support/mod.rs"]
 mod support;
 
@@ -17,6 +19,7 @@ mod blending;
 mod bodies_of_tables;
 mod catalogues;
 mod conforming;
+mod comparing;
 mod fitting;
 mod foreign_avatars;
 mod foreign_bodies;

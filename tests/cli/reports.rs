@@ -2,6 +2,7 @@
 
 use crate::args;
 use crate::program::Desk;
+use crate::schema::violation;
 use crate::support::data;
 use serde_json::Value;
 
@@ -40,7 +41,7 @@ fn a_worse_result_is_exit_code_1() {
         desk.run(arguments)
     };
     let same = compare("run", &[]).exits(0, "itself");
-    assert!(same.out.contains("verdict: identical"), "{}", same.out);
+    assert!(same.out.contains("verdict: unchanged"), "{}", same.out);
 
     let mut results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
     let summary = &mut results["tables"][0]["sequences"][0]["variants"][1]["summary"]["values"]["psnr"];
@@ -48,7 +49,7 @@ fn a_worse_result_is_exit_code_1() {
     *summary = Value::from(psnr - 0.25);
     desk.put("worse.json", results.to_string());
     let worse = compare("worse.json", &[]).exits(1, "0.25 dB less");
-    assert!(worse.out.contains("verdict: worse") && worse.out.contains("psnr"), "{}", worse.out);
+    assert!(worse.out.contains("verdict: regressed") && worse.out.contains("PSNR"), "{}", worse.out);
     compare("worse.json", &["--tolerance-psnr", "0.3"]).exits(0, "within the tolerance");
     for metric in skinsplat_metrics::METRICS {
         let option = format!("--tolerance-{}", metric.id);
@@ -56,7 +57,7 @@ fn a_worse_result_is_exit_code_1() {
         compare("run", &[&option, "much"]).refuses(&[&option, "much"], "no number");
     }
     let json: Value = serde_json::from_str(&compare("worse.json", &["--format", "json"]).out).unwrap();
-    assert_eq!(json["verdict"], "worse");
+    assert_eq!(json["verdict"], "regressed");
 
     results["tables"][0]["sequences"][0]["variants"][1]["summary"]["values"]["psnr"] =
         Value::from(psnr + 0.25);
@@ -65,7 +66,7 @@ fn a_worse_result_is_exit_code_1() {
 
     results["tables"][0]["experiment"] = Value::from("other");
     desk.put("other.json", results.to_string());
-    compare("other.json", &[]).exits(1, "nothing in common");
+    compare("other.json", &[]).exits(3, "nothing in common");
 }
 
 #[test]
@@ -135,4 +136,50 @@ fn only_metrics_with_a_column_are_computed() {
     let (both, one) = (scores("tiny.toml"), scores("one.toml"));
     assert!(both["ssim"].is_number() && one["ssim"].is_null(), "{both} {one}");
     assert_eq!(both["psnr"], one["psnr"]);
+}
+
+/// What a run writes is what the published schema says, in every table shape that the built-in ones have.
+#[test]
+fn results_are_of_the_published_schema() {
+    let schema: Value = serde_json::from_str(include_str!("../../reports/schema/results.json")).unwrap();
+    let desk = finished();
+    let results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
+    assert_eq!(violation(&schema, &results), None);
+    let baseline: Value = serde_json::from_str(include_str!("../../ci/baseline.json")).unwrap();
+    assert_eq!(violation(&schema, &baseline), None);
+    for (place, value) in
+        [("/tables/0/source", "elsewhere"), ("/tables/0/table/rows/0/kind", "odd"), ("/schema", "4")]
+    {
+        let mut odd = results.clone();
+        *odd.pointer_mut(place).unwrap() = Value::from(value);
+        assert!(violation(&schema, &odd).is_some(), "{place}");
+    }
+    let mut odd = results;
+    odd["tables"][0]["unknown"] = Value::from(1);
+    assert!(violation(&schema, &odd).unwrap().contains("unknown"));
+}
+
+/// One file, whose tables, charts and pictures are there, and that says what is not.
+#[test]
+fn a_run_is_one_page() {
+    let desk = finished();
+    let page = |arguments: Vec<std::ffi::OsString>| {
+        desk.ok(arguments);
+        desk.read("page.html")
+    };
+    let without = page(args!["report", "run", "--format", "html", "--out", "page.html"]);
+    assert!(without.contains("Without pictures") && without.contains("Partial"), "no pictures were kept");
+    assert!(without.contains("Two strategies on a turning body"));
+    let with = page(args!["run", "tiny.toml", "--limit", "2", "--out", "run", "--html", "page.html", "-q"]);
+    assert!(with.contains("data:image/jpeg;base64,") && with.contains("data:image/gif;base64,"));
+    assert!(!with.contains("Without pictures") && with.len() < 15_000_000);
+    assert_eq!(
+        page(args!["report", "run", "--format", "html", "--out", "page.html"]),
+        with,
+        "the same from the folder"
+    );
+    let none = page(args!["report", "run", "--format", "html", "--images", "none", "--out", "page.html"]);
+    assert!(none.len() < with.len() && !none.contains("data:image/jpeg"));
+    desk.run(args!["run", "tiny.toml", "--images", "some"])
+        .refuses(&["some", "none, key, all"], "no such choice");
 }

@@ -38,9 +38,22 @@ fn a_quick_examination_writes_its_report_and_pictures() {
         "1"
     ];
     assert_eq!(desk.ok(again), "");
-    for file in ["stress.md", "stress.csv", "stress.json"] {
+    for file in ["stress.md", "stress.csv", "stress.json", "stress.html"] {
         assert_eq!(desk.read(&format!("report/{file}")), desk.read(&format!("again/{file}")), "{file}");
     }
+}
+
+/// Of two equal bones, 15 power steps are wrong from a relative angle of 162.5 degrees on: not "from 17.5", what is left to 180.
+#[test]
+fn the_page_draws_errors_against_the_extreme_and_cells_name_the_angle() {
+    let desk = Desk::new();
+    let shown = desk.ok(args!["stress", "--only", "averages", "--out", "report"]);
+    let power = shown.lines().find(|line| line.starts_with("| power-15 |")).unwrap();
+    assert!(power.contains("breaks at 162.5"), "{power}");
+    assert!(shown.contains("the axis is relative angle, degrees"), "{shown}");
+    let page = desk.read("report/stress.html");
+    assert!(page.contains("to 180°: error against the extreme") && page.contains("<polyline"));
+    assert!(page.contains("power-15 at 170: ") && page.contains("gap, 3 bones: error against the extreme"));
 }
 
 #[test]

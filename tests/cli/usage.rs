@@ -4,8 +4,9 @@ use crate::args;
 use crate::program::Desk;
 use std::process::{Command, Stdio};
 
-const SUBCOMMANDS: [&str; 15] = [
+const SUBCOMMANDS: [&str; 16] = [
     "run",
+    "compare",
     "plan",
     "report",
     "list",
@@ -32,7 +33,8 @@ fn top_level_help() {
     Commands:
       run          Evaluate: make avatars, pose, render, score, and write the tables
       plan         Show what a run would do, without doing it
-      report       Print the tables of a run again, or compare them with a baseline
+      report       Print the tables of a run again
+      compare      Compare a run with an earlier one: what regressed, improved, is missing or new
       list         List experiments, datasets, strategies, recipes, protocols or metrics
       check        See whether bodies, poses, cameras and masks of a data set fit together
       fetch-help   Say who has a data set, what to unpack where, and what a registry says of it
@@ -62,7 +64,8 @@ fn top_level_help() {
       0  done
       1  ran, and the verdict is bad (a regression against a baseline, data or an engine that does not fit)
       2  could not run: usage, input or disk; one line on stderr says which file and field
-      3  incomplete: some frames failed or are missing from the tables
+      3  incomplete: some frames failed or are missing from the tables, or a baseline has what was not
+         compared
     "#);
 }
 

@@ -4,6 +4,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod comparisons;
 mod experiments;
 mod formats;
 mod made_up;

@@ -3,7 +3,7 @@
 use super::made_up::{TABLE_7, results, run};
 use skinsplat::experiment::{Experiment, Outcome, Plan, Records};
 use skinsplat::report::Results;
-use skinsplat::report::compare::{Tolerances, Verdict, compare};
+use skinsplat::report::compare::{Fate, Tolerances, Verdict, compare};
 use skinsplat_metrics::{METRICS, MetricId, Values};
 use skinsplat_table::{Content, Digits, csv};
 
@@ -69,12 +69,13 @@ fn a_metric_that_moves_is_found_within_its_own_tolerance() {
         let worse = if id.higher_is_better() { -0.5 } else { 0.5 };
         let moved = |by: f64| everywhere(move |other| if other == id { by } else { 0.0 });
         let lost = compare(&base, &moved(worse), &Tolerances::default());
-        assert_eq!(lost.verdict, Verdict::Worse, "{id:?}");
-        assert!(lost.sequences.iter().all(|m| m.metric == id) && !lost.sequences.is_empty(), "{id:?}");
+        assert_eq!(lost.verdict, Verdict::Regressed, "{id:?}");
+        let mut regressed = lost.lines.iter().filter(|line| line.fate == Fate::Regressed);
+        assert!(lost.counts.regressed > 0 && regressed.all(|line| line.metric == Some(id)), "{id:?}");
         let gained = compare(&base, &moved(-worse), &Tolerances::default());
-        assert_eq!(gained.verdict, Verdict::Better, "{id:?}");
+        assert_eq!(gained.verdict, Verdict::Improved, "{id:?}");
         let allowed = Tolerances::each(|other| if other == id { 1.0 } else { 0.0 });
-        assert_eq!(compare(&base, &moved(worse), &allowed).verdict, Verdict::Within, "{id:?}");
+        assert_eq!(compare(&base, &moved(worse), &allowed).verdict, Verdict::Unchanged, "{id:?}");
     }
 }
 

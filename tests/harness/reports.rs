@@ -3,8 +3,7 @@
 use super::made_up::{
     figures, fitted_table_7, options, results, run, score, scored, table, table_7, with_holes,
 };
-use skinsplat::experiment::{Experiment, Outcome, Records, Source, plan};
-use skinsplat::report::compare::{Tolerances, Verdict, compare};
+use skinsplat::experiment::{Experiment, Records, Source, plan};
 use skinsplat::report::{self, Results, TableResults};
 use skinsplat_metrics::MetricId;
 use skinsplat_table::{Content, Row, RowKind, csv, markdown};
@@ -91,8 +90,8 @@ fn results_read_back_and_other_versions_are_refused() {
     assert_eq!(again, results);
     assert_eq!(again.to_json(), text);
     assert_eq!(report::page(&again), report::page(&results));
-    let error = Results::from_json(&text.replacen("\"schema\": 3", "\"schema\": 9", 1)).unwrap_err();
-    assert_eq!(error, "schema: 9; expected 3, which this program reads");
+    let error = Results::from_json(&text.replacen("\"schema\": 4", "\"schema\": 9", 1)).unwrap_err();
+    assert_eq!(error, "schema: 9; expected 3 to 4, which this program reads");
     assert!(Results::from_json("{}").unwrap_err().contains("missing field `schema`"));
     let damaged: [Damage; 7] = [
         (|t| t.table.rows[1].cells[0].notes.push(99), "table `table7`: rows[1]: note 99; expected below 4"),
@@ -166,65 +165,6 @@ fn a_table_without_data_shows_the_paper_s_alone() {
     assert_eq!((table.source, table.table.rows.len(), results.missing()), (Source::Absent, 0, 0));
     let text = report::markdown(table);
     assert!(text.contains("Not run: no data for this table.") && text.contains("19.70"), "{text}");
-}
-
-#[test]
-fn comparisons_find_what_moved() {
-    let base = results(&table_7(), run);
-    assert_eq!(compare(&base, &base, &Tolerances::none()).verdict, Verdict::Identical);
-    let moved = |by: f64| {
-        results(&table_7(), |plan| {
-            let mut records = run(plan);
-            let key = &plan.jobs[3].variants[1].key;
-            let Outcome::Scored { score, .. } = &mut records.get_mut(key).unwrap().outcome else {
-                unreachable!()
-            };
-            let psnr = score.value(MetricId::PSNR).unwrap();
-            score.values.insert(MetricId::PSNR, psnr + by);
-            records
-        })
-    };
-    let within = compare(&base, &moved(-0.01), &Tolerances::default());
-    assert_eq!((within.verdict, within.sequences.len(), within.frames.len()), (Verdict::Within, 0, 1));
-    assert_eq!(compare(&base, &moved(-0.01), &Tolerances::none()).verdict, Verdict::Worse);
-    let better = compare(&base, &moved(0.6), &Tolerances::default());
-    assert_eq!((better.verdict, better.verdict.is_good()), (Verdict::Better, true));
-    let worse = compare(&base, &moved(-0.6), &Tolerances::default());
-    assert_eq!((worse.verdict, worse.verdict.is_good()), (Verdict::Worse, false));
-    assert_eq!(worse.frames[0].at, "table7 / gymnasts/anna/anna-test / quaternions / image_0003");
-    let (change, expected) = (worse.sequences[0].candidate - worse.sequences[0].baseline, -0.1);
-    assert!((change - expected).abs() < 1e-12, "{change}");
-    insta::assert_snapshot!(worse.markdown(5), @r#"
-    # Comparison: worse
-
-    4 sequences and variants compared.
-
-    ## Sequences beyond the tolerance
-
-    | where | metric | baseline | candidate | change |
-    |:--|:--|--:|--:|--:|
-    | table7 / gymnasts/anna/anna-test / quaternions | PSNR | 20.750000 | 20.650000 | -1.000e-1 (worse) |
-
-    ## Frames that moved most
-
-    | where | metric | baseline | candidate | change |
-    |:--|:--|--:|--:|--:|
-    | table7 / gymnasts/anna/anna-test / quaternions / image_0003 | PSNR | 20.800000 | 20.200000 | -6.000e-1 (worse) |
-    "#);
-}
-
-#[test]
-fn lost_frames_are_worse_and_new_ones_are_not() {
-    let (full, holes) = (results(&table_7(), run), results(&table_7(), with_holes));
-    let lost = compare(&full, &holes, &Tolerances::each(|_| 1e9));
-    assert_eq!(lost.verdict, Verdict::Worse);
-    assert!(lost.lost.iter().any(|at| at.ends_with("anna-test / matrices / image_0002")), "{:?}", lost.lost);
-    assert!(lost.lost.iter().any(|at| at.ends_with("bob-test / matrices lpips")), "{:?}", lost.lost);
-    let empty = results(&table_7(), |_| Records::new());
-    assert_eq!(compare(&empty, &full, &Tolerances::none()).lost.len(), 0);
-    let mut other = full.clone();
-    other.tables[0].experiment = "table8".into();
-    assert_eq!(compare(&empty, &other, &Tolerances::none()).verdict, Verdict::NothingCompared);
 }
 
 /// PSNR of `matrices` 30 and 32 dB with the two seeds, of `quaternions` 1 and 3 dB more.

@@ -4,7 +4,7 @@ use super::exact::Exact;
 use super::method::{Answer, METHODS, Method};
 use super::problem::{FAMILIES, Family, Problem, random_rotation};
 use super::table::{
-    Cell, Findings, LIMITS, Row, Threshold, Verdict, bisect, column, exactly, label, line as row, shown,
+    Cell, Findings, LIMITS, Row, Threshold, Verdict, bisect, column, exactly, label, line as row, said, shown,
 };
 use rayon::prelude::*;
 use skinsplat_core::math::portable;
@@ -188,6 +188,7 @@ impl Threshold {
             precision: if T::EPSILON.to_f64() < 1e-10 { "f64" } else { "f32" },
             breaks_at,
             axis: family.axis.to_owned(),
+            said: family.said(breaks_at),
         }
     }
 }
@@ -268,11 +269,15 @@ impl Invariance {
 }
 
 fn verdicts(precision: &str, lines: &[Line]) -> Table {
-    let line =
-        |(method, lines): (&Method, &[Line])| row([method.to_string()], lines.iter().map(summary).collect());
+    let line = |(method, lines): (&Method, &[Line])| {
+        row(
+            [method.to_string()],
+            lines.iter().zip(FAMILIES.iter()).map(|(line, family)| summary(line, family)).collect(),
+        )
+    };
     // The families are the same in both precisions: explained once.
     let family = |family: &Family| match precision {
-        "f64" => column(family.id).about(format!("{}; the axis is {}", family.about, family.axis)),
+        "f64" => column(family.id).about(format!("{}; the axis is {}", family.about, family.said_axis())),
         _ => column(family.id),
     };
     Table {
@@ -283,7 +288,7 @@ fn verdicts(precision: &str, lines: &[Line]) -> Table {
     }
 }
 
-fn summary(line: &Line) -> table::Cell {
+fn summary(line: &Line, family: &Family) -> table::Cell {
     if let Some(threshold) = &line.threshold {
         return threshold.cell();
     }
@@ -292,8 +297,12 @@ fn summary(line: &Line) -> table::Cell {
     match (worst, first) {
         (Verdict::Holds, _) | (_, None) => table::Cell::text("holds"),
         (Verdict::Degrades, Some(row)) => {
-            let words = format!("degrades at {}", row.input);
-            row.input.parse().map_or_else(|_| table::Cell::text(&words), |at| table::Cell::phrase(at, &words))
+            let at = row.input.parse().map(|x| family.said(x));
+            let words = |at: String| format!("degrades at {at}");
+            at.map_or_else(
+                |_| table::Cell::text(words(row.input.clone())),
+                |at| table::Cell::phrase(at, words(said(at))),
+            )
         }
         (Verdict::Breaks, Some(_)) => table::Cell::text("breaks"),
     }
@@ -319,6 +328,12 @@ fn invariances(lines: &[Line]) -> Table {
         remarks: vec![format!("Over the inputs that determine the answer to {least}° or better.")],
         ..Table::new("invariances", "What should not matter: largest change of the answer, degrees")
     }
+}
+
+/// A value on the axis of a family of this section as a person would say it, and what it is; none of another section's.
+pub(super) fn said_of(family: &str, input: &str) -> Option<(f64, &'static str)> {
+    let family = FAMILIES.iter().find(|known| known.id == family)?;
+    Some((family.said(input.parse().ok()?), family.said_axis()))
 }
 
 fn causes() -> Vec<String> {

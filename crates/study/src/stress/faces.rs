@@ -139,12 +139,14 @@ pub(super) fn run() -> Findings {
                     if let Some(sound) = sound {
                         let broken =
                             |x: f64| measure(kind, family, x).is_some_and(|m| m.verdict == Verdict::Breaks);
+                        let breaks_at = bisect(sound, x, broken);
                         findings.thresholds.push(Threshold {
                             section: SECTION,
                             family: family.id.to_owned(),
                             subject: RotationChoice::FaceFrame(kind).to_string(),
                             precision: "f32",
-                            breaks_at: bisect(sound, x, broken),
+                            breaks_at,
+                            said: breaks_at,
                             axis: family.axis.to_owned(),
                         });
                     }

@@ -9,6 +9,7 @@ mod double_double;
 mod exact;
 mod faces;
 mod method;
+mod page;
 mod pictures;
 mod poses;
 mod problem;
@@ -20,6 +21,7 @@ mod sequences;
 mod stage;
 pub mod table;
 
+pub use page::page;
 pub use report::{Picture, Report};
 
 use skinsplat_posing::PosingError;

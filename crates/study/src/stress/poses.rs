@@ -256,6 +256,7 @@ fn shifts(stage: &Stage<'_>, strategies: &[Strategy], findings: &mut Findings) -
                 subject: strategy.to_string(),
                 precision: "f32",
                 breaks_at: SHIFTS[first],
+                said: SHIFTS[first],
                 axis: "metres".to_owned(),
             });
         }

@@ -11,6 +11,11 @@ pub(super) struct Problem {
     pub(super) weights: Vec<f64>,
 }
 
+/// An axis towards half a turn from below.
+const BELOW: &str = "180° less the relative angle, degrees";
+/// An axis away from half a turn.
+const BEYOND: &str = "relative angle less 180°, degrees";
+
 /// Problems along one axis.
 pub(super) struct Family {
     /// Short name, for columns.
@@ -29,6 +34,24 @@ pub(super) struct Family {
 impl Family {
     pub(super) fn problem(&self, x: f64) -> Problem {
         (self.make)(x)
+    }
+
+    /// The value that a person would say for one on the axis: the relative angle itself, where the axis counts from 180 degrees so that
+    /// it can come near them without cancellation.
+    pub(super) fn said(&self, x: f64) -> f64 {
+        match self.axis {
+            BELOW => 180.0 - x,
+            BEYOND => 180.0 + x,
+            _ => x,
+        }
+    }
+
+    /// What that value is.
+    pub(super) fn said_axis(&self) -> &'static str {
+        match self.axis {
+            BELOW | BEYOND => "relative angle, degrees",
+            axis => axis,
+        }
     }
 }
 
@@ -135,7 +158,7 @@ pub(super) const FAMILIES: [Family; 15] = [
     },
     Family {
         id: "to 180°",
-        axis: "180° less the relative angle, degrees",
+        axis: BELOW,
         about: "two bones of equal weight; a tie at 0",
         points: &[179.9, 150.0, 90.0, 60.0, 30.0, 10.0, 3.0, 1.0, 0.1, 1e-3, 1e-6, 1e-9, 0.0],
         continuous: true,
@@ -143,7 +166,7 @@ pub(super) const FAMILIES: [Family; 15] = [
     },
     Family {
         id: "beyond 180°",
-        axis: "relative angle less 180°, degrees",
+        axis: BEYOND,
         about: "two bones of equal weight, more than half a turn apart: quaternions on opposite sides",
         points: &[170.0, 90.0, 30.0, 10.0, 3.0, 1.0, 0.1, 1e-3, 1e-6, 1e-9],
         continuous: true,
@@ -151,7 +174,7 @@ pub(super) const FAMILIES: [Family; 15] = [
     },
     Family {
         id: "to 180°, 55:45",
-        axis: "180° less the relative angle, degrees",
+        axis: BELOW,
         about: "two bones of unequal weight; unique up to and at 180°",
         points: &[179.9, 150.0, 90.0, 60.0, 30.0, 10.0, 3.0, 1.0, 0.1, 1e-3, 1e-6, 1e-9, 0.0],
         continuous: true,

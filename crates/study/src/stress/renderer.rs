@@ -127,12 +127,14 @@ fn threshold(family: &Family, sound: f64, broken: f64) -> Threshold {
         measure(&(family.make)(x), false).map_or(Verdict::Breaks, |measured| verdict(&measured))
             == Verdict::Breaks
     };
+    let breaks_at = bisect(sound, broken, breaks);
     Threshold {
         section: SECTION,
         family: family.id.to_owned(),
         subject: "splat renderer".to_owned(),
         precision: "f32",
-        breaks_at: bisect(sound, broken, breaks),
+        breaks_at,
+        said: breaks_at,
         axis: family.axis.to_owned(),
     }
 }

@@ -202,13 +202,21 @@ pub struct Threshold {
     pub breaks_at: f64,
     /// What the axis counts.
     pub axis: String,
+    /// What a person would say for the value: the angle itself where the axis counts from 180 degrees.
+    pub said: f64,
 }
 
 impl Threshold {
-    /// `breaks at 133`.
+    /// `breaks at 162.5`.
     pub(super) fn cell(&self) -> skinsplat_table::Cell {
-        skinsplat_table::Cell::phrase(self.breaks_at, format!("breaks at {}", shown(self.breaks_at)))
+        skinsplat_table::Cell::phrase(self.said, format!("breaks at {}", said(self.said)))
     }
+}
+
+/// A value on an axis as a person would say it: an angle near half a turn has a digit after the point.
+pub(super) fn said(value: f64) -> String {
+    let digits = if (100.0..1000.0).contains(&value) { Digits::Shortest(4) } else { DIGITS };
+    digits.show(value)
 }
 
 /// What one section found.

@@ -32,7 +32,7 @@ pub fn markdown(trade: &Trade, pictures: &[(String, String, String)]) -> String 
 }
 
 /// A row per choice.
-fn picks(recommendation: &Recommendation) -> Table {
+pub(super) fn picks(recommendation: &Recommendation) -> Table {
     let row = |pick: &Pick| {
         let choice = match pick.satisfied {
             true => pick.choice.clone(),

@@ -1,0 +1,264 @@
+//! Charts as inline SVG: every point says what it is when pointed at, and may lead to its picture.
+
+use super::ticks::Axis;
+use maud::{Markup, html};
+
+/// A chart.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    title: String,
+    x: String,
+    y: String,
+    kind: Kind,
+    log: [bool; 2],
+    series: Vec<Series>,
+    note: String,
+}
+
+/// How points are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Joined in their order.
+    Lines,
+    /// By themselves, with their names beside them.
+    Scatter,
+}
+
+/// Points that belong together.
+#[derive(Clone, Debug)]
+pub struct Series {
+    name: String,
+    points: Vec<Point>,
+}
+
+/// A point.
+#[derive(Clone, Debug)]
+pub struct Point {
+    x: f64,
+    y: f64,
+    title: Option<String>,
+    label: Option<String>,
+    picture: Option<[String; 2]>,
+}
+
+const SIZE: [f64; 2] = [640.0, 260.0];
+const MARGIN: [f64; 4] = [76.0, 16.0, 12.0, 48.0];
+/// Colours of the style sheet; from there on with another dash.
+const COLOURS: usize = 7;
+
+impl Point {
+    /// A point; one that is not finite is left out.
+    pub fn new(x: f64, y: f64) -> Self {
+        Self { x, y, title: None, label: None, picture: None }
+    }
+
+    /// With what it says when pointed at.
+    pub fn titled(self, title: impl Into<String>) -> Self {
+        Self { title: Some(title.into()), ..self }
+    }
+
+    /// With a name beside it.
+    pub fn labelled(self, label: impl Into<String>) -> Self {
+        Self { label: Some(label.into()), ..self }
+    }
+
+    /// Leading to the pictures of a frame of a sequence.
+    pub fn to(self, sequence: impl Into<String>, frame: impl Into<String>) -> Self {
+        Self { picture: Some([sequence.into(), frame.into()]), ..self }
+    }
+}
+
+impl Series {
+    /// Points under a name.
+    pub fn new(name: impl Into<String>, points: Vec<Point>) -> Self {
+        Self { name: name.into(), points }
+    }
+}
+
+impl Chart {
+    /// Lines over x.
+    pub fn lines(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        let (log, series) = ([false; 2], Vec::new());
+        let (title, x, y, note) = (title.into(), x.into(), y.into(), String::new());
+        Self { title, x, y, kind: Kind::Lines, log, series, note }
+    }
+
+    /// Points in a plane.
+    pub fn scatter(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self { kind: Kind::Scatter, ..Self::lines(title, x, y) }
+    }
+
+    /// With logarithmic axes, x and y.
+    pub fn log(self, x: bool, y: bool) -> Self {
+        Self { log: [x, y], ..self }
+    }
+
+    /// With one more series.
+    pub fn with(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// With a sentence below.
+    pub fn note(self, note: impl Into<String>) -> Self {
+        Self { note: note.into(), ..self }
+    }
+
+    /// How many points cannot be drawn: infinite ones, and those not above 0 on a logarithmic axis.
+    fn left_out(&self) -> usize {
+        let fits = |value: f64, log: bool| value.is_finite() && (!log || value > 0.0);
+        let points = self.series.iter().flat_map(|s| &s.points);
+        points.filter(|p| !(fits(p.x, self.log[0]) && fits(p.y, self.log[1]))).count()
+    }
+
+    pub(super) fn markup(&self, at: &str) -> Markup {
+        let points = || self.series.iter().flat_map(|s| &s.points);
+        let x = Axis::of(points().map(|p| p.x), self.log[0]);
+        let y = Axis::of(points().map(|p| p.y), self.log[1]);
+        let frame = Frame { x, y };
+        let left_out = self.left_out();
+        html! {
+            figure.chart {
+                figcaption id={ (at) "-c" } { (self.title) }
+                svg viewBox=(format!("0 0 {} {}", SIZE[0], SIZE[1])) role="img" aria-labelledby={ (at) "-c" } {
+                    (frame.grid(&self.x, &self.y))
+                    @for (i, series) in self.series.iter().enumerate() { (series.markup(i, self.kind, &frame)) }
+                }
+                @if self.series.len() > 1 { (self.legend()) }
+                @if left_out > 0 {
+                    p.remark { (left_out) " of the points cannot be drawn on these axes (infinite, or 0 on a logarithmic one)." }
+                }
+                @if !self.note.is_empty() { p.remark { (self.note) } }
+            }
+        }
+    }
+
+    fn legend(&self) -> Markup {
+        html! {
+            ul.keys {
+                @for (i, series) in self.series.iter().enumerate() {
+                    li {
+                        svg.key viewBox="0 0 24 10" aria-hidden="true" { line class=(class(i)) x1="0" y1="5" x2="24" y2="5" {} }
+                        " " (series.name)
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Colour and dash of a series.
+fn class(series: usize) -> String {
+    let dash = if series >= COLOURS { " dash" } else { "" };
+    format!("c{}{dash}", series % COLOURS)
+}
+
+/// The area between the axes.
+struct Frame {
+    x: Axis,
+    y: Axis,
+}
+
+impl Frame {
+    fn place_x(&self, value: f64) -> Option<f64> {
+        let [left, right, ..] = MARGIN;
+        Some(left + self.x.at(value)? * (SIZE[0] - left - right))
+    }
+
+    fn place_y(&self, value: f64) -> Option<f64> {
+        let [_, _, top, bottom] = MARGIN;
+        Some(SIZE[1] - bottom - self.y.at(value)? * (SIZE[1] - top - bottom))
+    }
+
+    fn place(&self, point: &Point) -> Option<[f64; 2]> {
+        Some([self.place_x(point.x)?, self.place_y(point.y)?])
+    }
+
+    fn grid(&self, x: &str, y: &str) -> Markup {
+        let [left, right, top, bottom] = MARGIN;
+        let [width, height] = SIZE;
+        let xs = self.x.ticks.iter().filter_map(|(at, label)| Some((self.place_x(*at)?, label)));
+        let ys = self.y.ticks.iter().filter_map(|(at, label)| Some((self.place_y(*at)?, label)));
+        html! {
+            g.grid {
+                @for (at, label) in ys {
+                    line x1=(left) x2=(width - right) y1=(n(at)) y2=(n(at)) {}
+                    text x=(left - 6.0) y=(n(at + 4.0)) text-anchor="end" { (label) }
+                }
+                @for (at, label) in xs {
+                    line x1=(n(at)) x2=(n(at)) y1=(top) y2=(height - bottom) {}
+                    text x=(n(at)) y=(height - bottom + 16.0) text-anchor="middle" { (label) }
+                }
+                text.axis x=(n((left + width - right) / 2.0)) y=(height - 6.0) text-anchor="middle" { (x) }
+                text.axis transform=(format!("translate(16 {}) rotate(-90)", n((top + height - bottom) / 2.0))) text-anchor="middle" { (y) }
+            }
+        }
+    }
+}
+
+impl Series {
+    fn markup(&self, index: usize, kind: Kind, frame: &Frame) -> Markup {
+        let placed: Vec<(&Point, [f64; 2])> =
+            self.points.iter().filter_map(|point| Some((point, frame.place(point)?))).collect();
+        let path: Vec<String> = placed.iter().map(|(_, [x, y])| format!("{},{}", n(*x), n(*y))).collect();
+        // A mark per point is too much where there are thousands: the line has them all.
+        let marks = placed.len() <= 400 || kind == Kind::Scatter;
+        html! {
+            g class=(class(index)) {
+                @if kind == Kind::Lines && placed.len() > 1 { polyline points=(path.join(" ")) {} }
+                @if marks { @for (point, at) in &placed { (self.mark(point, *at, kind)) } }
+            }
+        }
+    }
+
+    fn mark(&self, point: &Point, [x, y]: [f64; 2], kind: Kind) -> Markup {
+        let radius = if kind == Kind::Scatter { 4.5 } else { 3.0 };
+        let title = point.title.clone().unwrap_or_else(|| format!("{}: {}, {}", self.name, point.x, point.y));
+        let right = x < SIZE[0] * 0.7;
+        let dot = html! {
+            circle cx=(n(x)) cy=(n(y)) r=(radius) { title { (title) } }
+            @if let Some(label) = &point.label {
+                text x=(n(if right { x + 7.0 } else { x - 7.0 })) y=(n(y + 4.0)) text-anchor=(if right { "start" } else { "end" }) { (label) }
+            }
+        };
+        match &point.picture {
+            Some([sequence, name]) => html! {
+                a href="#pictures" data-sequence=(sequence) data-frame=(name) aria-label=(title) { (dot) }
+            },
+            None => dot,
+        }
+    }
+}
+
+/// A coordinate in a tenth of a pixel.
+fn n(value: f64) -> String {
+    let text = format!("{value:.1}");
+    text.strip_suffix(".0").unwrap_or(&text).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_placed_titled_and_linked() {
+        let points = vec![
+            Point::new(0.0, 10.0).titled("frame 0: 10 dB").to("lab", "image_0000"),
+            Point::new(1.0, f64::INFINITY),
+            Point::new(2.0, 20.0),
+        ];
+        let html = Chart::lines("T", "x", "y").with(Series::new("a", points)).markup("s").into_string();
+        assert!(html.contains("<title>frame 0: 10 dB</title>"), "{html}");
+        assert!(html.contains(r#"data-sequence="lab" data-frame="image_0000""#), "{html}");
+        assert_eq!(html.matches("<circle").count(), 2, "{html}");
+        assert!(html.contains("1 of the points cannot be drawn"), "{html}");
+        assert!(!html.contains("NaN") && !html.contains("inf\""), "{html}");
+    }
+
+    #[test]
+    fn ten_thousand_points_stay_small() {
+        let points = (0..10_000).map(|i| Point::new(f64::from(i), f64::from(i % 7))).collect();
+        let html = Chart::lines("T", "x", "y").with(Series::new("a", points)).markup("s").into_string();
+        assert!(html.len() < 250_000, "{}", html.len());
+    }
+}

@@ -1,0 +1,112 @@
+//! The page of a run: what `run --html` and `report --format html` write.
+
+use super::Context;
+use super::run::stores;
+use anyhow::{Context as _, Result};
+use image::RgbImage;
+use skinsplat::report::Results;
+use skinsplat::report::html::{BOUND, Extras, KeptPictures, MovingPicture, Stills, html};
+use skinsplat::report::timing;
+use skinsplat::run::pictures::{INDEX, Index, Keep, Kept, Moving};
+use skinsplat::run::store;
+use skinsplat_data::atomic;
+use std::io::Write;
+use std::path::Path;
+
+/// Which pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Images {
+    /// None
+    None,
+    /// Of every sequence the frames on which the variants differ most
+    Key,
+    /// Every frame
+    All,
+}
+
+impl Images {
+    pub(super) fn keep(self) -> Keep {
+        match self {
+            Self::None => Keep::None,
+            Self::Key => Keep::Key,
+            Self::All => Keep::All,
+        }
+    }
+}
+
+/// Folder, inside the run's, of the pictures that its page shows.
+pub(super) const PICTURES: &str = "pictures";
+
+/// The page of a run as HTML: its results with what lies in its folder. Without a folder there is nothing but the results.
+///
+/// # Errors
+/// Pictures or records that cannot be read; the message names the file.
+pub(super) fn page(results: &Results, folder: &Path, images: Images) -> Result<String> {
+    let curves = folder.join("curves.csv");
+    let curves = match curves.is_file() {
+        true => {
+            std::fs::read_to_string(&curves).with_context(|| format!("{}: cannot read", curves.display()))?
+        }
+        false => String::new(),
+    };
+    let records = store::merge(stores(folder)?.iter().map(std::path::PathBuf::as_path))?;
+    let tables = timing::costs(results, &records).into_iter().collect();
+    let extras = Extras { pictures: kept(folder, images)?, curves, tables, bound: BOUND };
+    Ok(html(results, &extras))
+}
+
+/// Writes a page and says how large it is.
+pub(super) fn write_page(path: &Path, html: &str, context: Context) -> Result<()> {
+    atomic::write(path, |w| w.write_all(html.as_bytes()))?;
+    context.note(format!("{}: {:.1} MB", path.display(), html.len() as f64 / 1e6));
+    Ok(())
+}
+
+/// The pictures that a run kept.
+fn kept(folder: &Path, images: Images) -> Result<KeptPictures> {
+    let folder = folder.join(PICTURES);
+    let path = folder.join(INDEX);
+    if images == Images::None || !path.is_file() {
+        return Ok(KeptPictures::default());
+    }
+    let index: Index = super::selection::read_json(&path)?;
+    let wanted = |kept: &&Kept| images == Images::All || kept.telling;
+    let stills =
+        index.frames.iter().filter(wanted).map(|kept| still(&folder, kept)).collect::<Result<_>>()?;
+    let moving = index.moving.iter().map(|of| moving(&folder, of)).collect::<Result<_>>()?;
+    Ok(KeptPictures { stills, moving })
+}
+
+fn still(folder: &Path, kept: &Kept) -> Result<Stills> {
+    let read = |file: &String| -> Result<RgbImage> {
+        let path = folder.join(file);
+        Ok(image::open(&path)
+            .with_context(|| format!("{}: cannot read the picture", path.display()))?
+            .to_rgb8())
+    };
+    let variants =
+        kept.variants.iter().map(|(id, file)| Ok((id.clone(), read(file)?))).collect::<Result<_>>()?;
+    Ok(Stills {
+        table: kept.table.clone(),
+        sequence: kept.sequence.clone(),
+        frame: kept.frame.clone(),
+        truth: read(&kept.truth)?,
+        variants,
+    })
+}
+
+fn moving(folder: &Path, of: &Moving) -> Result<MovingPicture> {
+    let path = folder.join(&of.file);
+    let gif = std::fs::read(&path).with_context(|| format!("{}: cannot read", path.display()))?;
+    // Width and height are the first words after the signature.
+    let word = |at: usize| gif.get(at..at + 2).map_or(1, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
+    let size = [word(6), word(8)];
+    Ok(MovingPicture {
+        table: of.table.clone(),
+        sequence: of.sequence.clone(),
+        columns: of.columns.clone(),
+        frames: of.frames,
+        gif,
+        size,
+    })
+}

@@ -1,0 +1,82 @@
+//! A comparison as annotations of GitHub Actions: workflow commands, a line each.
+//!
+//! <https://docs.github.com/en/actions/reference/workflow-commands-for-github-actions>
+
+use super::tables::finer;
+use super::{Changes, Fate, Line};
+use skinsplat_metrics::MetricId;
+
+/// Annotations of one level that GitHub shows per step.
+const SHOWN: usize = 10;
+/// Frames that an annotation names.
+const FRAMES: usize = 3;
+
+/// The annotations: an error per regression or loss, a notice per improvement, a warning per note, and the verdict.
+pub fn github(changes: &Changes) -> String {
+    let mut text = String::new();
+    for (level, bad) in [("error", true), ("notice", false)] {
+        let of_level = |line: &&Line| line.fate != Fate::Unchanged && changes.is_bad(line) == bad;
+        let lines: Vec<&Line> = changes.lines.iter().filter(of_level).collect();
+        // One place is for the verdict, one for what is left out.
+        let fit = if lines.len() <= SHOWN - 1 { lines.len() } else { SHOWN - 2 };
+        for line in &lines[..fit] {
+            text += &command(level, &title(line), &message(changes, line));
+        }
+        if lines.len() > fit {
+            text += &command(level, "reproduce compare", &format!("{} more like these", lines.len() - fit));
+        }
+    }
+    for note in changes.notes.iter().take(SHOWN) {
+        text += &command("warning", "reproduce compare", &note.text);
+    }
+    let level = if changes.is_good() { "notice" } else { "error" };
+    text + &command(level, "reproduce compare", &changes.summary())
+}
+
+fn title(line: &Line) -> String {
+    format!("{} {}", line.table, line.fate.id())
+}
+
+fn message(changes: &Changes, line: &Line) -> String {
+    let at = format!("{} {}", line.sequence, line.variant);
+    let Some(metric) = line.metric else {
+        return match line.frames.as_slice() {
+            [] => format!("{at}: all of it"),
+            frames => {
+                format!("{at}: {} frames, {}", frames.len(), frames[..frames.len().min(FRAMES)].join(", "))
+            }
+        };
+    };
+    let shown =
+        |value: Option<f64>| value.map_or_else(|| "nothing".to_owned(), |value| finer(metric).show(value));
+    let numbers = format!("{} {} -> {}", metric.title(), shown(line.baseline), shown(line.current));
+    let tolerance = line.tolerance.map_or_else(String::new, |t| format!(" (tolerance {t})"));
+    format!("{at}: {numbers}{tolerance}{}", frames(changes, line, metric))
+}
+
+/// The frames behind a movement.
+fn frames(changes: &Changes, line: &Line, metric: MetricId) -> String {
+    let of_line = changes.frames.iter().filter(|m| {
+        m.metric == metric
+            && [&m.table, &m.sequence, &m.variant] == [&line.table, &line.sequence, &line.variant]
+    });
+    let names: Vec<&str> = of_line.take(FRAMES).map(|m| m.frame.as_str()).collect();
+    if names.is_empty() { String::new() } else { format!("; most in {}", names.join(", ")) }
+}
+
+/// A workflow command: what it says ends no line and starts no other command.
+fn command(level: &str, title: &str, message: &str) -> String {
+    let data = |text: &str| text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A");
+    let property = |text: &str| data(text).replace(':', "%3A").replace(',', "%2C");
+    format!("::{level} title={}::{}\n", property(title), data(message))
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn names_cannot_leave_their_command() {
+        let made = super::command("error", "a,b: 5%\n::error::x", "100 %\r\n::stop-commands::y");
+        let expected = "::error title=a%2Cb%3A 5%25%0A%3A%3Aerror%3A%3Ax::100 %25%0D%0A::stop-commands::y\n";
+        assert_eq!(made, expected);
+    }
+}

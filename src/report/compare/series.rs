@@ -1,0 +1,150 @@
+//! One variant on one sequence, before and after.
+
+use super::{Changes, Fate, Line, Move, Tolerances};
+use crate::report::results::{FrameResult, SequenceResults, TableResults, VariantResults};
+use skinsplat_metrics::{FrameScore, MetricId, Protocol, Summary};
+use std::collections::BTreeMap;
+
+/// A variant on a sequence of a table.
+#[derive(Clone, Copy)]
+pub(super) struct Series<'a> {
+    pub(super) table: &'a TableResults,
+    pub(super) sequence: &'a SequenceResults,
+    pub(super) variant: &'a VariantResults,
+}
+
+/// The same in two documents.
+pub(super) struct Pair<'a> {
+    pub(super) before: Series<'a>,
+    pub(super) after: Series<'a>,
+}
+
+impl<'a> Series<'a> {
+    /// A line on all of it, without a number.
+    pub(super) fn line(&self, fate: Fate) -> Line {
+        Line {
+            table: self.table.experiment.clone(),
+            sequence: self.sequence.id.clone(),
+            variant: self.variant.id.clone(),
+            metric: None,
+            baseline: None,
+            current: None,
+            tolerance: None,
+            fate,
+            frames: Vec::new(),
+        }
+    }
+
+    /// The scored frames by name.
+    fn frames(&self) -> BTreeMap<&'a str, &'a FrameResult> {
+        let scored = self.variant.frames.iter().filter(|frame| frame.score.is_some());
+        scored.map(|frame| (frame.name.as_str(), frame)).collect()
+    }
+
+    /// The aggregate over some of its frames; none if the protocol's code is not at hand.
+    fn over(&self, frames: &[&FrameResult]) -> Option<Summary> {
+        let protocol = Protocol::parse(&self.table.protocol.id).ok()?;
+        let scores: Vec<FrameScore> = frames.iter().filter_map(|frame| frame.score.clone()).collect();
+        protocol.aggregate(&scores).ok()
+    }
+}
+
+impl Pair<'_> {
+    /// Adds what moved.
+    pub(super) fn compare(&self, tolerances: &Tolerances, changes: &mut Changes) {
+        changes.compared += 1;
+        let (before, after) = (self.before.frames(), self.after.frames());
+        let only = |a: &BTreeMap<&str, &FrameResult>, b: &BTreeMap<&str, &FrameResult>| -> Vec<String> {
+            a.keys().filter(|name| !b.contains_key(*name)).map(|&name| name.to_owned()).collect()
+        };
+        let (lost, gained) = (only(&before, &after), only(&after, &before));
+        let shared: Vec<&str> = before.keys().filter(|name| after.contains_key(*name)).copied().collect();
+        let whole = lost.is_empty() && gained.is_empty();
+        for (frames, fate) in [(lost, Fate::Missing), (gained, Fate::New)] {
+            if !frames.is_empty() {
+                changes.lines.push(Line { frames, ..self.before.line(fate) });
+            }
+        }
+        if shared.is_empty() {
+            changes.compared -= 1;
+            return;
+        }
+        let of = |frames: &BTreeMap<&str, &FrameResult>, series: &Series<'_>| match whole {
+            true => series.variant.summary.clone(),
+            false => {
+                series.over(&shared.iter().filter_map(|name| frames.get(name).copied()).collect::<Vec<_>>())
+            }
+        };
+        self.numbers(of(&before, &self.before), of(&after, &self.after), tolerances, changes);
+        for name in shared {
+            self.frame(before[name], after[name], tolerances, changes);
+        }
+    }
+
+    /// The aggregates.
+    fn numbers(
+        &self,
+        before: Option<Summary>,
+        after: Option<Summary>,
+        tolerances: &Tolerances,
+        changes: &mut Changes,
+    ) {
+        let value = |summary: &Option<Summary>, metric| summary.as_ref().and_then(|s| s.value(metric));
+        for metric in MetricId::all() {
+            let (baseline, current) = (value(&before, metric), value(&after, metric));
+            let tolerance = tolerances.of(&self.before.table.experiment, metric);
+            let fate = match (baseline, current) {
+                (Some(a), Some(b)) => Fate::of(metric, a, b, tolerance),
+                (Some(_), None) => Fate::Missing,
+                (None, Some(_)) => Fate::New,
+                (None, None) => continue,
+            };
+            let (metric, tolerance) = (Some(metric), Some(tolerance));
+            changes.lines.push(Line { metric, baseline, current, tolerance, ..self.before.line(fate) });
+        }
+    }
+
+    /// A frame: it shows where a movement comes from, and counts by itself where that was asked for.
+    fn frame(
+        &self,
+        before: &FrameResult,
+        after: &FrameResult,
+        tolerances: &Tolerances,
+        changes: &mut Changes,
+    ) {
+        let table = &self.before.table.experiment;
+        for metric in MetricId::all() {
+            let (Some(a), Some(b)) = (before.value(metric), after.value(metric)) else { continue };
+            if a == b {
+                continue;
+            }
+            let worse = (b < a) == metric.higher_is_better();
+            changes.frames.push(Move {
+                table: table.clone(),
+                sequence: self.before.sequence.id.clone(),
+                label: self.before.sequence.label.clone(),
+                variant: self.before.variant.id.clone(),
+                frame: before.name.clone(),
+                metric,
+                baseline: a,
+                current: b,
+                tolerances: (b - a).abs() / tolerances.of(table, metric),
+                worse,
+                pictures: None,
+            });
+            let bound = tolerances.of_frame(metric);
+            if let Some(tolerance) = bound
+                && Fate::of(metric, a, b, tolerance) == Fate::Regressed
+            {
+                changes.lines.push(Line {
+                    metric: Some(metric),
+                    baseline: Some(a),
+                    current: Some(b),
+                    tolerance: Some(tolerance),
+                    frames: vec![before.name.clone()],
+                    ..self.before.line(Fate::Regressed)
+                });
+            }
+        }
+    }
+}

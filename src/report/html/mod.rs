@@ -1,0 +1,129 @@
+//! A run as one page for a browser: its tables, how scores go over frames, how fits went, and pictures to compare.
+
+mod charts;
+mod encode;
+mod pictures;
+
+pub use pictures::{KeptPictures, MovingPicture, Stills};
+
+use super::comparison;
+use super::results::{Results, TableResults};
+use crate::experiment::Source;
+use pictures::Budget;
+use skinsplat_page::{Page, Part, Section};
+use skinsplat_table::Table;
+
+/// What a page may hold beside the results.
+#[derive(Debug, Default)]
+pub struct Extras {
+    /// The pictures that the run kept.
+    pub pictures: KeptPictures,
+    /// How its fits went, as `curves.csv` says.
+    pub curves: String,
+    /// Further tables, each at the end of the page: where the time went.
+    pub tables: Vec<Table>,
+    /// Most bytes of the page.
+    pub bound: usize,
+}
+
+/// Most bytes of a page, unless another bound is given.
+pub const BOUND: usize = 15_000_000;
+
+/// The page, as HTML.
+pub fn html(results: &Results, extras: &Extras) -> String {
+    let mut budget = Budget::new(&extras.pictures);
+    let page = page(results, extras, &budget);
+    let mut html = page.html();
+    // Smaller pictures, then fewer, until it fits.
+    while html.len() > extras.bound && budget.shrink() {
+        html = self::page(results, extras, &budget).html();
+    }
+    html
+}
+
+fn page(results: &Results, extras: &Extras, budget: &Budget) -> Page {
+    let titles: Vec<&str> = results.tables.iter().map(|table| table.table.title.as_str()).collect();
+    let mut page = Page::new(match titles.as_slice() {
+        [one] => format!("Results: {one}"),
+        _ => "Results".to_owned(),
+    });
+    page = page.lead(format!(
+        "Made by `{}`. Bold is the best value of a sequence, with everything that the frames do not decide to be worse. ↑: more is \
+         better, ↓: less is better; n/c: not computed. Headings sort; whoever points at a number sees all of its digits, or its \
+         interval.",
+        super::page::command(results)
+    ));
+    let code = results.code;
+    page = page.lead(format!(
+        "Plan `{}`; code versions: fit {}, strategy {}, render {}, metrics {}.",
+        results.plan, code.fit, code.strategy, code.render, code.metrics
+    ));
+    for text in warnings(results, extras, budget) {
+        page = page.warning(text);
+    }
+    for table in &results.tables {
+        page = page.section(section(table, extras, budget));
+    }
+    let mut rest = Section::new("run", "The run");
+    extras.tables.iter().for_each(|table| rest.push(Part::Table(table.clone())));
+    if extras.tables.is_empty() { page } else { page.section(rest) }
+}
+
+/// What a reader must not miss.
+fn warnings(results: &Results, extras: &Extras, budget: &Budget) -> Vec<String> {
+    let mut texts = Vec::new();
+    if results.missing() > 0 {
+        texts.push(format!(
+            "Incomplete: {} missing; see the footnotes.",
+            super::captions::count(results.missing(), "score")
+        ));
+    }
+    if !results.options.subset.is_everything() {
+        texts.push("Partial: only a part of the data was asked for; the tables say which.".to_owned());
+    }
+    let empty = results.tables.iter().filter(|table| table.table.rows.is_empty());
+    texts.extend(empty.map(|table| format!("{}: not run, no data for it.", table.table.title)));
+    if extras.pictures.is_empty() {
+        texts.push(
+            "Without pictures: the run kept none (`reproduce run --html FILE --images key|all` keeps them)."
+                .to_owned(),
+        );
+    }
+    texts.extend(budget.says(extras.bound));
+    texts
+}
+
+fn section(results: &TableResults, extras: &Extras, budget: &Budget) -> Section {
+    let mut section = Section::new(&results.experiment, &results.table.title);
+    section.push(Part::Table(results.table.clone()));
+    if !results.comparisons.is_empty() {
+        let mut table = comparison::table(&results.comparisons);
+        table.sentences.push("Mean differences, and what their 95 % intervals decide".to_owned());
+        section.push(Part::Table(table));
+    }
+    if let Some(paper) = &results.paper {
+        let mut paper = paper.clone();
+        let beside = match results.source {
+            Source::Own => "The numbers above are of the same data set",
+            Source::StandIn | Source::Absent => "The numbers above are of other data: the two do not compare",
+        };
+        paper.sentences.push(beside.to_owned());
+        section.push(Part::Aside(paper));
+    }
+    let viewer = budget.viewer(results, &extras.pictures);
+    for part in charts::over_frames(results, &extras.pictures) {
+        section.push(part);
+    }
+    if let Some(viewer) = viewer {
+        section.push(Part::Viewer(viewer));
+    }
+    let moving: Vec<Part> = budget.moving(results, &extras.pictures);
+    if !moving.is_empty() {
+        section.push(Part::Folded("Moving pictures".to_owned(), moving));
+    }
+    let curves = charts::training(results, &extras.curves);
+    if !curves.is_empty() {
+        section.push(Part::Folded("How the fits went".to_owned(), curves));
+    }
+    section
+}

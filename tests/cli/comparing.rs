@@ -1,0 +1,134 @@
+//! `compare`: exit codes, formats, files, tolerances, pictures.
+
+use crate::args;
+use crate::program::Desk;
+use crate::schema::violation;
+use serde_json::Value;
+
+/// Two runs: `run`, and `worse.json` whose second variant lost 0.25 dB.
+fn finished() -> Desk {
+    let desk = Desk::new();
+    desk.put("tiny.toml", include_str!("tiny.toml"));
+    desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1", "--images", "-q"]);
+    desk.put("worse.json", changed(&desk, |results| shift(results, -0.25)).to_string());
+    desk
+}
+
+fn changed(desk: &Desk, change: impl Fn(&mut Value)) -> Value {
+    let mut results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
+    change(&mut results);
+    results
+}
+
+/// Moves the PSNR of the second variant and of its frame.
+fn shift(results: &mut Value, by: f64) {
+    for place in ["summary/values", "frames/0/score/values"] {
+        let place = format!("/tables/0/sequences/0/variants/1/{place}/psnr");
+        let psnr = results.pointer_mut(&place).unwrap();
+        *psnr = Value::from(psnr.as_f64().unwrap() + by);
+    }
+}
+
+#[test]
+fn exit_codes_formats_and_files() {
+    let desk = finished();
+    let same = desk.run(args!["compare", "run", "run"]).exits(0, "itself");
+    assert!(same.out.starts_with("verdict: unchanged"), "{}", same.out);
+
+    let save = ["markdown=c.md", "junit=c.xml", "csv=c.csv", "json=c.json", "github=c.txt"];
+    let mut arguments = args!["compare", "run", "worse.json"];
+    arguments.extend(save.iter().flat_map(|file| args!["--save", *file]));
+    let worse = desk.run(arguments).exits(1, "0.25 dB less");
+    assert!(worse.out.contains("regressed") && worse.out.contains("tiny"), "{}", worse.out);
+    assert!(desk.read("c.md").starts_with("# Comparison: regressed\n"));
+    assert!(desk.read("c.xml").contains("failures=\"1\""), "{}", desk.read("c.xml"));
+    assert!(desk.read("c.csv").lines().nth(1).unwrap().contains("regressed"), "{}", desk.read("c.csv"));
+    assert!(desk.read("c.txt").starts_with("::error title=tiny regressed::"), "{}", desk.read("c.txt"));
+    for (format, file) in [("markdown", "c.md"), ("junit", "c.xml"), ("csv", "c.csv"), ("json", "c.json")] {
+        let printed = desk.run(args!["compare", "run", "worse.json", "--format", format]).exits(1, format);
+        assert_eq!(printed.out, desk.read(file), "{format}");
+    }
+    let schema: Value = serde_json::from_str(include_str!("../../reports/schema/compare.json")).unwrap();
+    let json: Value = serde_json::from_str(&desk.read("c.json")).unwrap();
+    assert_eq!(violation(&schema, &json), None);
+    assert_eq!(json["verdict"], "regressed");
+    let mut odd = json.clone();
+    odd["lines"][0]["fate"] = Value::from("odd");
+    assert!(violation(&schema, &odd).unwrap().contains("lines[0].fate"), "the schema refuses something");
+
+    desk.put("better.json", changed(&desk, |results| shift(results, 0.25)).to_string());
+    desk.run(args!["compare", "run", "better.json"]).exits(0, "0.25 dB more");
+    desk.run(args!["compare", "run", "better.json", "--strict"]).exits(1, "0.25 dB more, strictly");
+    desk.put(
+        "other.json",
+        changed(&desk, |r| r["tables"][0]["experiment"] = Value::from("other")).to_string(),
+    );
+    let nothing = desk.run(args!["compare", "run", "other.json"]).exits(3, "nothing in common");
+    assert!(nothing.out.contains("note: nothing with scores in common"), "{}", nothing.out);
+    let cut = |r: &mut Value| r["tables"][0]["sequences"][0]["variants"].as_array_mut().unwrap().truncate(1);
+    desk.put("less.json", changed(&desk, cut).to_string());
+    desk.run(args!["compare", "run", "less.json"]).exits(3, "a variant less");
+    desk.run(args!["compare", "less.json", "run"]).exits(0, "a variant more");
+    desk.run(args!["report", "worse.json", "--baseline", "run"]).exits(1, "the alias");
+}
+
+#[test]
+fn tolerances_come_from_options_files_and_metrics() {
+    let desk = finished();
+    desk.put("wide.toml", "psnr = 0.3\n");
+    desk.put("table.toml", "psnr = 0.1\n[tables.tiny]\npsnr = 0.3\n");
+    desk.put("bad.toml", "psnr = -1\n");
+    let with = |more: &[&str]| {
+        let mut arguments = args!["compare", "run", "worse.json"];
+        arguments.extend(more.iter().map(std::ffi::OsString::from));
+        desk.run(arguments)
+    };
+    with(&["--tolerances", "wide.toml"]).exits(0, "the file's");
+    with(&["--tolerances", "table.toml"]).exits(0, "the table's");
+    with(&["--tolerances", "wide.toml", "--tolerance-psnr", "0.1"]).exits(1, "the option goes first");
+    with(&["--tolerance-psnr", "inf"]).exits(0, "whatever it is");
+    with(&["--tolerances", "bad.toml"]).refuses(&["bad.toml", "psnr: -1"], "below zero");
+    with(&["--tolerances", "none.toml"]).refuses(&["none.toml"], "no file");
+    for bad in ["nan", "-0.1", "much", ""] {
+        with(&[&format!("--tolerance-psnr={bad}")]).refuses(&["--tolerance-psnr"], bad);
+    }
+}
+
+#[test]
+fn pictures_that_both_runs_kept_are_named() {
+    let desk = finished();
+    crate::program::copy(&desk.path("run"), &desk.path("now"));
+    desk.put("now/results.json", desk.bytes("worse.json"));
+    let out = desk.run(args!["compare", "run", "now", "--format", "json"]).exits(1, "worse").out;
+    let json: Value = serde_json::from_str(&out).unwrap();
+    let pictures = json["frames"][0]["pictures"].as_array().unwrap();
+    assert!(pictures.iter().all(|path| desk.path(path.as_str().unwrap()).is_file()), "{pictures:?}");
+    assert!(pictures[0].as_str().unwrap().starts_with("run/pictures/"), "{pictures:?}");
+    for folder in ["run/images", "run/pictures"] {
+        std::fs::remove_dir_all(desk.path(folder)).unwrap();
+    }
+    let out = desk.run(args!["compare", "run", "now", "--format", "json"]).exits(1, "worse").out;
+    assert!(!out.contains("pictures"), "one of the runs has none");
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused_in_one_line() {
+    let desk = finished();
+    for (arguments, parts) in [
+        (args!["compare", "run"], ["one run", "expected two"]),
+        (args!["compare", "run", "run", "--against-paper"], ["--against-paper", "expected one"]),
+        (args!["compare", "run", "nowhere"], ["nowhere", "cannot read"]),
+        (args!["compare", "run", "run", "--table", "table9"], ["table9", "tiny"]),
+        (args!["compare", "run", "run", "--format", "pdf"], ["pdf", "junit"]),
+        (args!["compare", "run", "run", "--save", "pdf=x"], ["pdf=x", "junit"]),
+        (args!["compare", "run", "run", "--save", "csv=no/such/folder/x"], ["no/such/folder", ""]),
+    ] {
+        let shown = format!("{arguments:?}");
+        desk.run(arguments).refuses(&parts, &shown);
+    }
+    desk.put("old.json", changed(&desk, |r| r["schema"] = Value::from(2)).to_string());
+    desk.run(args!["compare", "old.json", "run"])
+        .refuses(&["old.json", "schema: 2", "3 to 4"], "an older schema");
+    let paper = desk.run(args!["compare", "run", "--against-paper"]).exits(3, "no printed numbers");
+    assert!(paper.out.contains("no table has printed numbers"), "{}", paper.out);
+}
