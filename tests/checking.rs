@@ -6,7 +6,7 @@
 mod support;
 
 use glam::DVec3;
-use skinsplat::check::{self, Finding, Kind, SequenceFit};
+use skinsplat_check::{self as check, Finding, Kind, SequenceFit};
 use skinsplat_core::scene::{Camera, Mask, Pose, RestBody};
 use skinsplat_data::folder::Options;
 use skinsplat_data::{Error, FrameGenerator, FrameRef, FrameSource, Sequence, Subject, Truth};
