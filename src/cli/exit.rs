@@ -25,6 +25,6 @@ impl From<Exit> for ExitCode {
 pub(super) const HELP: &str = "\
 Exit codes:
   0  done
-  1  ran, and the verdict is bad (a regression against a baseline, data or an engine that does not fit)
+  1  ran, and the verdict is bad (a regression against a baseline, data or an engine that is wrong)
   2  could not run: usage, input or disk; one line on stderr says which file and field
   3  incomplete: some frames failed or are missing from the tables, or a baseline has what was not compared";

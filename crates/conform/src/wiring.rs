@@ -231,8 +231,6 @@ pub(crate) enum Basis {
     Right,
     /// Without the factor (-1)^m.
     OddOrders,
-    /// Along -d.
-    OddDegrees,
     /// With one axis mirrored.
     Axis(usize),
     /// One coefficient.

@@ -63,7 +63,6 @@ pub(crate) fn is_flipped(basis: Basis, k: usize) -> bool {
     match basis {
         Basis::Right => false,
         Basis::OddOrders => m % 2 != 0,
-        Basis::OddDegrees => l % 2 == 1,
         Basis::One(other) => k == other,
         // Under x to -x the functions cos(m φ) of odd m and sin(m φ) of even m change their sign.
         Basis::Axis(0) => {
