@@ -61,10 +61,14 @@ fn noise_of_rounding(desk: &Desk) {
 fn shake(value: &mut Value, number: &mut u64) {
     match value {
         Value::Array(items) => items.iter_mut().for_each(|item| shake(item, number)),
-        Value::Object(fields) => fields.values_mut().for_each(|item| shake(item, number)),
+        // Counts are not rounded.
+        Value::Object(fields) => {
+            let measured = fields.iter_mut().filter(|(name, _)| *name != "splats");
+            measured.for_each(|(_, item)| shake(item, number));
+        }
         Value::Number(of) if of.is_f64() => {
             *number += 1;
-            let sign = if *number % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
             *value = Value::from(of.as_f64().unwrap() * (1.0 + sign * 1e-7));
         }
         _ => {}

@@ -45,8 +45,8 @@ pub(super) struct Compare {
 /// How a comparison is made, whoever asks for it.
 #[derive(Debug, clap::Args)]
 pub(super) struct Comparing {
-    /// TOML file of tolerances: `psnr = 0.05`; for one table under [tables.ID]; for single frames, which count only then, under
-    /// [frames]. The options below go before it; inf: whatever it is
+    /// TOML file of tolerances: `psnr = 0.05`; for one table under `[tables.ID]`; for single frames, which count only then, under
+    /// `[frames]`. The options below go before it; inf: whatever it is
     #[arg(long, value_name = "FILE", help_heading = "Comparison")]
     tolerances: Option<PathBuf>,
     #[command(flatten)]

@@ -4,10 +4,12 @@ use super::compare::{Comparing, folder, load};
 use super::output::{emit, written};
 use super::page::{Images, page, write_page};
 use super::run::stores;
+use super::selection::read_json;
 use super::{Context, Exit};
 use anyhow::{Result, anyhow};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use skinsplat::report::{self, Results};
+use skinsplat::run::provenance::Phases;
 use skinsplat::run::store;
 use skinsplat_data::atomic;
 use skinsplat_table::{FORMATS, to_json};
@@ -31,7 +33,7 @@ pub(super) struct Report {
     /// Which of the pictures that the run kept (`run --images`) a page shows
     #[arg(long, value_enum, value_name = "WHICH", default_value_t = Images::All)]
     images: Images,
-    /// Where the time of the frames went, instead of the tables
+    /// Where the time went, instead of the tables: plan, avatars and frames of the last call, posing, drawing and scoring
     #[arg(long, conflicts_with = "baseline")]
     timing: bool,
     /// Only this table
@@ -56,7 +58,9 @@ impl Report {
         }
         if let Some(baseline) = &self.baseline {
             let changes = self.comparing.compare(&load(baseline)?, &results)?;
-            return self.comparing.print(&changes, &self.format, context);
+            // Formats of tables are of no use to it.
+            let format = if self.format == "json" { "json" } else { "text" };
+            return self.comparing.print(&changes, format, context);
         }
         let text = if self.timing { self.timing(&results)? } else { self.tables(&results)? };
         match &self.out {
@@ -82,10 +86,24 @@ impl Report {
 
     fn timing(&self, results: &Results) -> Result<String> {
         let records = store::merge(stores(folder(&self.run))?.iter().map(PathBuf::as_path))?;
-        let table = report::timing::phases(results, &records);
+        let mut tables = vec![report::timing::phases(results, &records)];
+        let path = folder(&self.run).join("run.json");
+        if path.is_file() {
+            let run: Timed = read_json(&path)?;
+            run.phases.iter().for_each(|phases| tables.insert(0, report::timing::calls(phases)));
+        }
         let format = if self.format == HTML { "markdown" } else { &self.format };
-        Ok(written(&table, format))
+        Ok(match format {
+            "json" => to_json(&tables),
+            format => tables.iter().map(|table| written(table, format)).collect::<Vec<_>>().join("\n"),
+        })
     }
+}
+
+/// What `run.json` says of times; runs of earlier programs say nothing.
+#[derive(serde::Deserialize)]
+struct Timed {
+    phases: Option<Phases>,
 }
 
 /// The format of pages, beside those of tables.

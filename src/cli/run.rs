@@ -10,7 +10,7 @@ use skinsplat::report;
 use skinsplat::run::gallery;
 use skinsplat::run::motion::{self, Motion};
 use skinsplat::run::pictures;
-use skinsplat::run::provenance::Provenance;
+use skinsplat::run::provenance::{Provenance, Stopwatch};
 use skinsplat::run::store::{self, FILE_NAME, Store};
 use skinsplat::run::{self, Error};
 use skinsplat_data::atomic;
@@ -76,7 +76,8 @@ impl Run {
         let start = Instant::now();
         let mut planned = self.planning.plan()?;
         let motion = self.motion(&mut planned, context)?;
-        let mut provenance = Provenance::starting(&planned.plan.digest);
+        let mut provenance = Provenance::starting(&planned.plan);
+        let stopwatch = Stopwatch::after_planning(start.elapsed().as_secs_f64());
         make_folder(&self.out)?;
         [self.out.clone(), self.out.join(AVATARS)].iter().for_each(|folder| atomic::sweep(folder));
         if self.fresh {
@@ -84,7 +85,8 @@ impl Run {
                 std::fs::remove_file(&path).with_context(|| format!("{}: cannot remove", path.display()))?;
             }
         }
-        provenance.frames_rendered = self.execute(&planned, context)?;
+        provenance.frames_rendered = self.execute(&planned, &stopwatch, context)?;
+        provenance.phases = stopwatch.phases();
         provenance.frames_planned = planned.plan.jobs.len();
         provenance.seconds = start.elapsed().as_secs_f64();
         if self.shard.is_some() {
@@ -94,14 +96,17 @@ impl Run {
     }
 
     /// Renders what is left to do; says how many frames that were.
-    fn execute(&self, planned: &Planned, context: Context) -> Result<usize> {
+    fn execute(&self, planned: &Planned, stopwatch: &Stopwatch, context: Context) -> Result<usize> {
         let Planned { plan, library, networks, .. } = planned;
         let known = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
         let left = store::outstanding(plan.shard(self.shard), &known);
         let mut store = Store::open(&self.out.join(self.store_name()), &plan.digest)?;
         let watch = Watch::new(context.quiet);
         let avatars = self.out.join(AVATARS);
-        run::execute(plan, &left, library, networks, &avatars, &mut store, &|event| watch.see(event))?;
+        run::execute(plan, &left, library, networks, &avatars, &mut store, &|event| {
+            stopwatch.see(&event);
+            watch.see(event);
+        })?;
         Ok(left.len())
     }
 

@@ -2,6 +2,7 @@
 
 use super::results::{Results, VariantResults};
 use crate::experiment::{Records, Seconds};
+use crate::run::provenance::Phases;
 use skinsplat_metrics::MetricId;
 use skinsplat_table::{Cell, Column, Digits, Direction, Label, Row, Table};
 
@@ -67,6 +68,26 @@ fn cells(variants: &[&VariantResults], records: &Records) -> Option<Vec<Cell>> {
         ms(|s| s.render),
         ms(|s| s.score),
     ])
+}
+
+/// Where the time of the last call went: planning, every avatar, the frames; wall-clock seconds.
+pub fn calls(phases: &Phases) -> Table {
+    let avatars = phases.avatars.iter().map(|(avatar, seconds)| (format!("avatar {avatar}"), *seconds));
+    let parts = std::iter::once(("data and plan".to_owned(), phases.plan)).chain(avatars);
+    let parts = parts.chain(std::iter::once(("frames".to_owned(), phases.frames)));
+    let row = |(i, (part, seconds)): (usize, (String, f64))| {
+        Row::new(i.to_string(), [part], vec![Cell::number(seconds, Digits::Significant(3))])
+    };
+    Table {
+        sentences: vec![
+            "Wall-clock seconds of the last call of `run` on this folder; what it found done took none"
+                .to_owned(),
+        ],
+        labels: vec![Label::new("part", "Part")],
+        columns: vec![time("seconds", "Time, s")],
+        rows: parts.enumerate().map(row).collect(),
+        ..Table::new("calls", "The last call")
+    }
 }
 
 /// Where the time of the frames went, per table: seconds of posing, drawing and scoring, added over threads.

@@ -159,6 +159,22 @@ fn results_are_of_the_published_schema() {
     assert!(violation(&schema, &odd).unwrap().contains("unknown"));
 }
 
+/// The circumstances of a run, and where its time went.
+#[test]
+fn a_run_says_what_made_it_and_how_long_that_took() {
+    let desk = finished();
+    let run: Value = serde_json::from_str(&desk.read("run/run.json")).unwrap();
+    let digest = |value: &Value| value.as_str().is_some_and(|text| text.len() == 64);
+    assert!(digest(&run["binary"]), "{run}");
+    let data = run["data"]["snapshot_ava/snapshot_ava/test_squat"].as_array().unwrap();
+    assert!(data.len() == 2 && data.iter().all(digest), "{run}");
+    assert_eq!(run["phases"]["avatars"].as_array().unwrap().len(), 1, "both variants draw one avatar");
+    assert!(run["phases"]["frames"].as_f64().unwrap() > 0.0 && run["code"]["fit"].is_u64(), "{run}");
+    let timing = desk.ok(args!["report", "run", "--timing"]);
+    assert!(timing.contains("| avatar snapshot_ava/snapshot_ava surface-vertex |"), "{timing}");
+    assert!(timing.contains("Where the time went") && timing.contains("| Skinned | "), "{timing}");
+}
+
 /// One file, whose tables, charts and pictures are there, and that says what is not.
 #[test]
 fn a_run_is_one_page() {

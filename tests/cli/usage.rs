@@ -64,8 +64,7 @@ fn top_level_help() {
       0  done
       1  ran, and the verdict is bad (a regression against a baseline, data or an engine that is wrong)
       2  could not run: usage, input or disk; one line on stderr says which file and field
-      3  incomplete: some frames failed or are missing from the tables, or a baseline has what was not
-         compared
+      3  incomplete: some frames failed or are missing, or something was not compared
     "#);
 }
 

@@ -42,7 +42,7 @@ pub struct Point {
 }
 
 const SIZE: [f64; 2] = [640.0, 260.0];
-const MARGIN: [f64; 4] = [76.0, 16.0, 12.0, 48.0];
+const MARGIN: [f64; 4] = [76.0, 28.0, 12.0, 48.0];
 /// Colours of the style sheet; from there on with another dash.
 const COLOURS: usize = 7;
 

@@ -59,6 +59,7 @@ const viewers = [...document.querySelectorAll(".viewer")].map(box => {
       image.alt = `${frame.sequence} ${frame.name}: ${error.checked && view.error !== null ? "error of " : ""}${view.label}`;
     });
     over.hidden = false;
+    box.querySelector(".stage").style.setProperty("--ratio", frame.size[0] / frame.size[1]);
     pair.dataset.split = "";
     part("left-name").textContent = "◧ " + say(left);
     part("right-name").textContent = say(right) + " ◨";

@@ -144,7 +144,7 @@ fn circumstances(baseline: &Results, current: &Results) -> Vec<Note> {
         }
     }
     if baseline.options.profile != current.options.profile {
-        let [a, b] = [baseline, current].map(|results| profile(results));
+        let [a, b] = [baseline, current].map(profile);
         say(format!("profile: {a} in the baseline, {b} now"));
     }
     if baseline.options.lpips_weights != current.options.lpips_weights {

@@ -18,7 +18,7 @@ pub fn github(changes: &Changes) -> String {
         let of_level = |line: &&Line| line.fate != Fate::Unchanged && changes.is_bad(line) == bad;
         let lines: Vec<&Line> = changes.lines.iter().filter(of_level).collect();
         // One place is for the verdict, one for what is left out.
-        let fit = if lines.len() <= SHOWN - 1 { lines.len() } else { SHOWN - 2 };
+        let fit = if lines.len() < SHOWN { lines.len() } else { SHOWN - 2 };
         for line in &lines[..fit] {
             text += &command(level, &title(line), &message(changes, line));
         }

@@ -54,7 +54,7 @@ pub(super) fn places(pictures: &[&RgbImage]) -> Vec<[u32; 3]> {
         .flat_map(|y| steps(width).map(move |x| [x, y]))
         .map(|at| (at, difference(pictures, at, side)))
         .collect();
-    found.sort_by(|a, b| b.1.cmp(&a.1));
+    found.sort_by_key(|(_, size)| std::cmp::Reverse(*size));
     let mut chosen: Vec<[u32; 3]> = Vec::new();
     for ([x, y], size) in found {
         let apart = |&[a, b, _]: &[u32; 3]| a.abs_diff(x) >= side || b.abs_diff(y) >= side;

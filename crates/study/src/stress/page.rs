@@ -38,9 +38,12 @@ fn section(findings: &Findings) -> Section {
     section
 }
 
+/// What was measured, by subject: where on the axis, and the row.
+type Subjects<'a> = BTreeMap<&'a str, Vec<(f64, &'a Row)>>;
+
 /// A chart per family of inputs along an axis, in f64: a line per subject that does not hold everywhere on it.
 fn curves(findings: &Findings) -> Vec<Chart> {
-    let mut families: BTreeMap<&str, BTreeMap<&str, Vec<(f64, &Row)>>> = BTreeMap::new();
+    let mut families: BTreeMap<&str, Subjects<'_>> = BTreeMap::new();
     let mut axes: BTreeMap<&str, &str> = BTreeMap::new();
     for row in findings.rows.iter().filter(|row| row.precision == "f64") {
         let Some((x, axis)) = said_of(&row.family, &row.input) else { continue };
@@ -53,7 +56,7 @@ fn curves(findings: &Findings) -> Vec<Chart> {
     families.into_iter().filter_map(|(family, subjects)| chart(family, axes[family], subjects)).collect()
 }
 
-fn chart(family: &str, axis: &str, subjects: BTreeMap<&str, Vec<(f64, &Row)>>) -> Option<Chart> {
+fn chart(family: &str, axis: &str, subjects: Subjects<'_>) -> Option<Chart> {
     let off = |rows: &[(f64, &Row)]| {
         rows.iter().any(|(_, row)| row.error.value().is_some_and(|e| e > LIMITS.degrees[0]))
     };
