@@ -13,6 +13,7 @@ pub const EMBEDDED: &[(&str, &str)] = &[
 /// Experiments of our own.
 pub const FURTHER: &[(&str, &str)] = &[
     ("experiments/budget.toml", include_str!("../../experiments/budget.toml")),
+    ("experiments/noise.toml", include_str!("../../experiments/noise.toml")),
     ("experiments/parts.toml", include_str!("../../experiments/parts.toml")),
     ("experiments/pushforward.toml", include_str!("../../experiments/pushforward.toml")),
     ("experiments/swap.toml", include_str!("../../experiments/swap.toml")),

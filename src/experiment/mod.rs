@@ -16,6 +16,7 @@ mod equivalence;
 mod error;
 mod paper;
 mod plan;
+mod poses;
 mod profile;
 mod record;
 mod rows;
@@ -33,12 +34,13 @@ pub use embedded::{EMBEDDED, FURTHER};
 pub use error::Error;
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
 pub use plan::{Job, JobVariant, Plan, PlannedTable, plan};
+pub use poses::{PoseNoise, TestPoses};
 pub use profile::{GivenWeights, Options, Profile, Subset};
-pub use record::{FrameRecord, Outcome, Records, Seconds};
+pub use record::{FittedOutcome, FrameRecord, Outcome, Records, Seconds};
 pub use rows::{DataRow, Source};
 pub use seeds::Replicate;
 pub use shard::Shard;
 pub use spec::{
-    ADDED_VARIANT, AvatarRecipe, Average, Column, Experiment, GIVEN_AVATAR, Layout, StandIn, Variant,
+    ADDED_VARIANT, AvatarRecipe, Average, Column, Experiment, GIVEN_AVATAR, Layout, Shown, StandIn, Variant,
 };
 pub use versions::CodeVersions;

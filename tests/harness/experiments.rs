@@ -38,7 +38,7 @@ fn the_experiments_load_from_the_folder_and_are_the_embedded_ones() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
     let loaded = Experiment::load_folder(&folder).unwrap();
     let ids: Vec<&str> = loaded.iter().map(|experiment| experiment.id.as_str()).collect();
-    let own = ["budget", "parts", "pushforward", "swap"];
+    let own = ["budget", "noise", "parts", "pushforward", "swap"];
     assert_eq!(ids, [&own[..], &["table1", "table2", "table3", "table4", "table5", "table6"]].concat());
     assert_eq!(loaded, Experiment::embedded_all());
     assert_eq!(loaded[own.len()..], Experiment::embedded());

@@ -28,9 +28,9 @@ pub(super) fn add(
     into: Gradients<'_>,
 ) -> Result<(), PosingError> {
     let Gradients { avatar, body } = into;
-    check(frame, gaussians, upstream)?;
+    check(frame.bound, upstream)?;
     if let Some(gradient) = &avatar {
-        check_avatar(frame.bound, gradient)?;
+        check_avatar(frame.bound, gaussians, gradient)?;
     }
     if let Some(gradient) = &body {
         check_body(frame, gradient)?;
@@ -68,23 +68,26 @@ pub(super) fn add(
     Ok(())
 }
 
-fn check(frame: &Frame<'_>, gaussians: &Gaussians, upstream: &PosedGradient) -> Result<(), SceneError> {
-    let bound = frame.bound;
-    bound.check_counts(gaussians)?;
-    let (n, coefficients) = (bound.len(), bound.sh.len());
-    expect_count("f_dc/f_rest", gaussians.sh.len(), coefficients)?;
+fn check(bound: &BoundAvatar, upstream: &PosedGradient) -> Result<(), SceneError> {
+    let n = bound.len();
     expect_count("gradient of the posed means", upstream.means.len(), n)?;
     expect_count("gradient of the factors", upstream.factors.len(), n)?;
     expect_count("gradient of the opacities", upstream.opacities.len(), n)?;
-    expect_count("gradient of the posed SH", upstream.sh.len(), coefficients)?;
+    expect_count("gradient of the posed SH", upstream.sh.len(), bound.sh.len())?;
     match upstream.view_frames.len() {
         0 => Ok(()),
         found => expect_count("gradient of the view frames", found, n),
     }
 }
 
-fn check_avatar(bound: &BoundAvatar, gradient: &AvatarGradient) -> Result<(), SceneError> {
+fn check_avatar(
+    bound: &BoundAvatar,
+    gaussians: &Gaussians,
+    gradient: &AvatarGradient,
+) -> Result<(), SceneError> {
+    bound.check_counts(gaussians)?;
     let n = bound.len();
+    expect_count("f_dc/f_rest", gaussians.sh.len(), bound.sh.len())?;
     expect_count("gradient of x, y, z", gradient.means.len(), n)?;
     expect_count("gradient of rot", gradient.rotations.len(), n)?;
     expect_count("gradient of scale", gradient.log_scales.len(), n)?;
@@ -241,7 +244,7 @@ impl AdjointChunk<'_, '_, '_> {
 
     /// What a block asks of its Gaussians.
     #[inline(always)]
-    fn to_avatar(
+    fn back_to_avatar(
         &mut self,
         position: usize,
         input: &BlockInput<'_>,
@@ -500,7 +503,7 @@ impl Visitor for AdjointChunk<'_, '_, '_> {
             });
         }
         if self.gradient.is_some() {
-            self.to_avatar(position, input, rotated, scales, &of_factors, &of_covariance);
+            self.back_to_avatar(position, input, rotated, scales, &of_factors, &of_covariance);
         }
         if let (false, Some(growth)) = (self.growth.is_empty(), input.growth()) {
             for lane in 0..block.count {

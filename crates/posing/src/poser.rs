@@ -84,7 +84,7 @@ impl Poser {
 
     /// Adds to the gradients what a pose contributes, so that the frames of a batch sum in the order of the calls: the
     /// transposed derivative of [`Self::pose`] applied to `upstream`. `gaussians` are those that `bound` was made of or
-    /// last updated with; `into` is an [`AvatarGradient`](skinsplat_core::scene::AvatarGradient) that [`reset`](skinsplat_core::scene::AvatarGradient::reset) made for them, or [`Gradients`]. A
+    /// last updated with, read only if the avatar's gradient is asked for; `into` is an [`AvatarGradient`](skinsplat_core::scene::AvatarGradient) that [`reset`](skinsplat_core::scene::AvatarGradient::reset) made for them, or [`Gradients`]. A
     /// camera in the options changes nothing: what it does not see has no derivatives.
     ///
     /// Exact for every strategy, piecewise where a strategy chooses (the branch of a matrix-to-quaternion conversion, the
