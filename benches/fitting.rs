@@ -3,6 +3,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use skinsplat::datasets::Registry;
+use skinsplat_fit::recipe::Poses;
 use skinsplat_fit::train::{Trainer, start};
 use skinsplat_fit::{FitOptions, Recipe};
 
@@ -13,9 +14,14 @@ fn steps(c: &mut Criterion) {
     let camera = &training.cameras[0];
     // The body's own vertices, then a finer surface.
     for edge_mm in [100, 14] {
-        for recipe in ["animatable-skinned+sh_step=0.0", "animatable-skinned+sh_degree=0"] {
+        for recipe in [
+            "animatable-skinned+sh_step=0.0",
+            "animatable-skinned+sh_step=0.0+poses=refine+pose.from=0.0",
+            "animatable-skinned+sh_degree=0",
+        ] {
             let recipe = Recipe::parse(recipe).unwrap();
-            let degree = recipe.sh_degree;
+            let (degree, poses) =
+                (recipe.sh_degree, if recipe.poses == Poses::Refine { ", poses" } else { "" });
             let options = FitOptions { recipe, iterations: u32::MAX, seed: 0, edge_mm };
             let mut trainer =
                 Trainer::new(training, &options, start(training, &options).unwrap().avatar).unwrap();
@@ -25,7 +31,7 @@ fn steps(c: &mut Criterion) {
             }
             let count = trainer.avatar().gaussians.len();
             let size = format!("{}x{}", camera.width, camera.height);
-            c.bench_function(&format!("step/{count} Gaussians, degree {degree}, {size}"), |b| {
+            c.bench_function(&format!("step/{count} Gaussians, degree {degree}{poses}, {size}"), |b| {
                 b.iter(|| trainer.step().unwrap());
             });
         }

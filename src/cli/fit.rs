@@ -18,7 +18,8 @@ use std::path::PathBuf;
 ///
 /// Writes a standard 3DGS PLY with its binding, which any splat viewer opens, and beside it a .json that says how it was
 /// made, with the training curve and the scores on the subject's test frames. The mesh of a hybrid is written beside it too
-/// (.texture.png and .vertices.npy): the avatar's file holds its Gaussians. A fit that is interrupted leaves a
+/// (.texture.png and .vertices.npy): the avatar's file holds its Gaussians. Of a recipe that refines the poses of training frames
+/// (poses=refine) they lie there as well (.poses.json: local rotations as axis times angle, and translations). A fit that is interrupted leaves a
 /// .checkpoint and goes on from there when the same command runs again; the result has the same bits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]

@@ -1,12 +1,13 @@
 //! The avatars of a plan: where each comes from, with exactly what that needs.
 
 use super::{
-    AvatarFile, AvatarRecipe, AvatarState, CodeVersions, DataRow, Profile, RenderedFrames, SubjectInfo,
-    Variant,
+    AvatarFile, AvatarRecipe, AvatarState, CodeVersions, DataRow, PoseNoise, Profile, RenderedFrames, Role,
+    SubjectInfo, Variant,
 };
 use serde::Serialize;
 use serde_json::{Value, json};
 use skinsplat_data::key::content_key;
+use skinsplat_data::select::evenly_spaced;
 use skinsplat_fit::recipe::{BindTo, Placement};
 use skinsplat_fit::surface::SurfaceInit;
 use skinsplat_fit::texture::TextureInit;
@@ -46,6 +47,11 @@ pub enum AvatarSource {
         /// The sequence whose body it is bound to.
         sequence: String,
     },
+    /// None: the subject does not have what it would be made from. Frames that need it fail with the reason, and no others.
+    Missing {
+        /// Why, one line.
+        problem: String,
+    },
     /// Images that another program rendered.
     Renders(RenderedFrames),
     /// Gaussians on the body's surface, coloured from the training frames.
@@ -78,7 +84,7 @@ pub enum AvatarSource {
 }
 
 /// The frames that an avatar is made from.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrainingFrames {
     /// Training sequence.
     pub sequence: String,
@@ -86,6 +92,12 @@ pub struct TrainingFrames {
     pub frames: Vec<usize>,
     /// Longer side to which they are reduced, pixels; native if absent.
     pub resolution: Option<u32>,
+    /// Further takes, and the indices of their frames.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<(String, Vec<usize>)>,
+    /// Noise on their poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<PoseNoise>,
 }
 
 /// A fit to be made.
@@ -101,7 +113,7 @@ impl PlannedAvatar {
     /// The frames that it is made from; none if it is a file.
     pub fn training(&self) -> Option<&TrainingFrames> {
         match &self.source {
-            AvatarSource::File { .. } | AvatarSource::Renders(_) => None,
+            AvatarSource::File { .. } | AvatarSource::Renders(_) | AvatarSource::Missing { .. } => None,
             AvatarSource::Surface { training, .. }
             | AvatarSource::Textured { training, .. }
             | AvatarSource::Fit { training, .. } => Some(training),
@@ -112,6 +124,7 @@ impl PlannedAvatar {
     pub fn label(&self) -> String {
         let how = match &self.source {
             AvatarSource::File { name, .. } => format!("file {name}"),
+            AvatarSource::Missing { problem } => format!("none: {problem}"),
             AvatarSource::Renders(renders) => format!("renders in {}", renders.folder.display()),
             AvatarSource::Surface { placement: Placement::Vertices, .. } => "surface-vertex".to_owned(),
             AvatarSource::Surface { placement: Placement::Faces, .. } => "surface-face".to_owned(),
@@ -132,6 +145,12 @@ pub(super) struct Planner<'a> {
     pub(super) resolution: Option<u32>,
     pub(super) subject: &'a SubjectInfo,
     pub(super) row: &'a DataRow,
+    /// Of the variant's poses.
+    pub(super) noise: Option<PoseNoise>,
+    /// From how many training sequences its avatar is made.
+    pub(super) takes: u32,
+    /// Whether test frames are used to limit further takes: most frames of a sequence.
+    pub(super) most_frames: Option<usize>,
 }
 
 impl Planner<'_> {
@@ -140,7 +159,13 @@ impl Planner<'_> {
     /// # Errors
     /// A file that is not there or does not fit, a subject without training frames for what is made from them.
     pub(super) fn avatar(&self, variant: &Variant) -> Result<PlannedAvatar, Problem> {
-        let (source, content) = self.source(variant)?;
+        let (source, content) = match self.too_few_takes() {
+            Some(problem) => {
+                let content = json!({ "missing": problem });
+                (AvatarSource::Missing { problem }, content)
+            }
+            None => self.source(variant)?,
+        };
         let key = content_key(&json!({ "avatar": content }));
         Ok(PlannedAvatar {
             key,
@@ -148,6 +173,12 @@ impl Planner<'_> {
             subject: self.row.subject.clone(),
             source,
         })
+    }
+
+    /// Why there is no avatar from as many takes as the variant asks for, if there is none.
+    fn too_few_takes(&self) -> Option<String> {
+        let (first, _) = self.row.train.as_ref().filter(|_| self.takes > 1)?;
+        self.further_takes(first).err().map(|(problem, expected)| format!("{problem}; expected {expected}"))
     }
 
     /// The source and what its key is made from.
@@ -258,16 +289,44 @@ impl Planner<'_> {
             let problem = format!("{}/{} has no training sequence", self.row.dataset, self.row.subject);
             (problem, "a subject with one, or a recipe that reads a file".to_owned())
         })?;
-        Ok(TrainingFrames { sequence, frames, resolution: self.resolution })
+        let (resolution, noise) = (self.resolution, self.noise);
+        Ok(TrainingFrames { further: self.further_takes(&sequence)?, sequence, frames, resolution, noise })
+    }
+
+    /// The takes after the first one, in the order of the subject's training sequences.
+    fn further_takes(&self, first: &str) -> Result<Vec<(String, Vec<usize>)>, Problem> {
+        let wanted = self.takes.saturating_sub(1) as usize;
+        let others = self.subject.sequences.iter().filter(|s| s.role == Role::Train && s.id != first);
+        let thinned = |sequence: &super::SequenceInfo| {
+            let all: Vec<usize> = (0..sequence.frames.len()).collect();
+            (sequence.id.clone(), evenly_spaced(&all, self.most_frames))
+        };
+        let takes: Vec<_> = others.take(wanted).map(thinned).collect();
+        match takes.len() == wanted {
+            true => Ok(takes),
+            false => {
+                let of = format!("{}/{}", self.row.dataset, self.row.subject);
+                let found = format!("{of} has {} of the {} training sequences", takes.len() + 1, self.takes);
+                Err((found, "as many takes as the variant asks for".to_owned()))
+            }
+        }
     }
 
     /// Everything that an avatar can depend on through its training frames.
     fn of_frames(&self, training: &TrainingFrames) -> Value {
-        let TrainingFrames { sequence, frames, resolution } = training;
-        json!({
+        let TrainingFrames { sequence, frames, resolution, further, noise } = training;
+        let mut made = json!({
             "code": CodeVersions::CURRENT.fit, "train": self.digest(sequence), "frames": frames,
             "resolution": resolution, "edge_mm": self.profile.avatar_edge_mm,
-        })
+        });
+        if !further.is_empty() {
+            let takes: Vec<_> = further.iter().map(|(id, frames)| (self.digest(id), frames)).collect();
+            made["further"] = json!(takes);
+        }
+        if let Some(noise) = noise {
+            made["pose_noise"] = json!(noise);
+        }
+        made
     }
 
     fn digest(&self, sequence: &str) -> &str {

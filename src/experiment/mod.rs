@@ -17,6 +17,7 @@ mod error;
 mod grid;
 mod paper;
 mod plan;
+mod poses;
 mod profile;
 mod record;
 mod rows;
@@ -35,12 +36,13 @@ pub use error::Error;
 pub use grid::Grid;
 pub use paper::{Paper, PaperRow, PaperVariant, Printed, Split};
 pub use plan::{Job, JobVariant, Plan, PlannedTable, plan};
+pub use poses::{PoseNoise, TestPoses};
 pub use profile::{GivenWeights, Options, Profile, Subset};
-pub use record::{FrameRecord, Outcome, Records, Seconds};
+pub use record::{FittedOutcome, FrameRecord, Outcome, Records, Seconds};
 pub use rows::{DataRow, RowDigests, Source};
 pub use seeds::Replicate;
 pub use shard::Shard;
 pub use spec::{
-    ADDED_VARIANT, AvatarRecipe, Average, Column, Experiment, GIVEN_AVATAR, Layout, StandIn, Variant,
+    ADDED_VARIANT, AvatarRecipe, Average, Column, Experiment, GIVEN_AVATAR, Layout, Shown, StandIn, Variant,
 };
 pub use versions::CodeVersions;

@@ -70,6 +70,9 @@ pub struct Paper {
     /// Remark on the table.
     #[serde(default)]
     pub note: Option<String>,
+    /// What becomes of test poses before they are scored in it, as far as is known; a caption says so where we show both.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test_poses: Option<String>,
     /// How well its protocol is known, and why.
     pub confidence: String,
     /// The stock evaluation of the compared method, read off its public code: split, resolution, background, region,

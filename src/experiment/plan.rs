@@ -3,11 +3,13 @@
 use super::avatar::{PlannedAvatar, Planner};
 use super::rows::{DataRow, Source, rows_of};
 use super::{
-    CodeVersions, Dataset, Error, Experiment, Options, SequenceInfo, Shard, SubjectInfo, Variant, catalog,
+    CodeVersions, Dataset, Error, Experiment, Options, PoseNoise, SequenceInfo, Shard, SubjectInfo, Variant,
+    catalog,
 };
 use serde::{Serialize, Serializer};
 use serde_json::json;
 use skinsplat_data::key::content_key;
+use skinsplat_fit::options::PoseFit;
 use skinsplat_metrics::{MetricId, Protocol, ProtocolId};
 use skinsplat_posing::Strategy;
 use std::collections::BTreeSet;
@@ -127,6 +129,12 @@ pub struct JobVariant {
     /// How its Gaussians are posed; none for a textured mesh. Serialised as its spec.
     #[serde(serialize_with = "spec")]
     pub strategy: Option<Strategy>,
+    /// Noise on the pose of the frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<PoseNoise>,
+    /// How the pose is fitted to the image for a further score; none if it is not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<PoseFit>,
 }
 
 fn id<S: Serializer>(protocol: &Protocol, serializer: S) -> Result<S::Ok, S::Error> {
@@ -240,8 +248,11 @@ impl Builder<'_> {
             None => None,
             Some(spec) => Some(catalog::strategy(spec).map_err(|why| invalid("strategy", why))?),
         };
-        let avatar = self.avatar(variant, row, resolution).map_err(|why| invalid("avatar", why))?;
-        Ok(Prepared { variant: variant.id.clone(), avatar, strategy })
+        let noise = experiment.noise_of(variant);
+        let avatar = self.avatar(variant, row, resolution, noise).map_err(|why| invalid("avatar", why))?;
+        // Nothing moves the frames of another program, nor a mesh that asks for nothing.
+        let fitted = experiment.fitted_test_poses().cloned();
+        Ok(Prepared { variant: variant.id.clone(), avatar, strategy, noise, fitted })
     }
 
     /// The key of the variant's avatar for a row's subject; the avatar is noted if it is new.
@@ -250,8 +261,11 @@ impl Builder<'_> {
         variant: &Variant,
         row: &DataRow,
         resolution: Option<u32>,
+        noise: Option<PoseNoise>,
     ) -> Result<String, (String, String)> {
-        let planner = Planner { profile: &self.options.profile, resolution, subject: self.subject(row), row };
+        let (profile, subject) = (&self.options.profile, self.subject(row));
+        let (takes, most_frames) = (variant.takes.unwrap_or(1), profile.max_train_frames);
+        let planner = Planner { profile, resolution, subject, row, noise, takes, most_frames };
         let avatar = planner.avatar(variant)?;
         let key = avatar.key.clone();
         if self.avatars.iter().all(|known| known.key != key) {
@@ -276,13 +290,21 @@ impl Builder<'_> {
         let choices = Protocol { title: String::new(), source: String::new(), ..Protocol::clone(protocol) };
         for &frame in &row.frames {
             let variants = variants.iter().map(|prepared| {
-                let content = json!({
+                let mut content = json!({
                     "code": CodeVersions::CURRENT, "test": test.digest, "frame": frame,
                     "avatar": prepared.avatar, "strategy": prepared.strategy, "protocol": choices,
                     "antialiased": experiment.antialiased, "resolution": resolution,
                     "metrics": metrics, "lpips_weights": weights.filter(|_| lpips),
                 });
+                if let Some(noise) = &prepared.noise {
+                    content["pose_noise"] = json!(noise);
+                }
+                if let Some(fitted) = &prepared.fitted {
+                    content["fitted"] = json!(fitted);
+                }
                 JobVariant {
+                    noise: prepared.noise,
+                    fitted: prepared.fitted.clone(),
                     id: prepared.variant.clone(),
                     key: content_key(&json!({ "frame": content })),
                     avatar: prepared.avatar.clone(),
@@ -321,6 +343,10 @@ struct Prepared {
     avatar: String,
     /// The strategy in full, so that two specs of one strategy share their keys.
     strategy: Option<Strategy>,
+    /// Noise on its poses.
+    noise: Option<PoseNoise>,
+    /// How poses of test images are fitted.
+    fitted: Option<PoseFit>,
 }
 
 /// What is computed of every frame: PSNR and the number of Gaussians, which cost nothing, and what the columns show.

@@ -36,9 +36,27 @@ pub enum Outcome {
         score: FrameScore,
         /// Gaussians that reach the image; none for a textured mesh.
         visible_splats: Option<u64>,
+        /// The same after the pose was fitted to the image, where that was asked for.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        fitted: Option<FittedOutcome>,
     },
     /// Failed: the error, one line. The next run tries again.
     Error(String),
+}
+
+/// What came of a frame whose pose was fitted to its image, the avatar frozen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FittedOutcome {
+    /// Fitted and scored.
+    Scored {
+        /// The metrics.
+        score: FrameScore,
+        /// By how much the joint that turned most has turned from the given pose, degrees.
+        turned_degrees: f64,
+    },
+    /// It could not be fitted: why, one line. The score as given stands.
+    Failed(String),
 }
 
 /// Seconds spent on a frame.

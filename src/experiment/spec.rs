@@ -1,10 +1,12 @@
 //! The experiment file: one table, described as data.
 
 use super::{
-    EMBEDDED, Error, FURTHER, Grid, Paper, Profile, Replicate, Source, Split, catalog, grid, seeds, validate,
+    EMBEDDED, Error, FURTHER, Grid, Paper, Profile, Replicate, Source, Split, TestPoses, catalog, grid, poses,
+    seeds, validate,
 };
 use serde::{Deserialize, Serialize};
 use skinsplat_data::{Capture, Gender};
+use skinsplat_fit::options::PoseFit;
 use skinsplat_metrics::MetricId;
 use skinsplat_posing::PRESETS;
 use std::collections::BTreeMap;
@@ -74,6 +76,19 @@ pub struct Experiment {
     /// Per metric, up to which difference two variants are as good as each other; see [`Experiment::margin`].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub equivalence: BTreeMap<MetricId, f64>,
+    /// Noise on the poses of every variant that has none of its own, for training and for test: degrees per joint
+    /// ([`skinsplat_data::pose_noise`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_noise: Option<f64>,
+    /// Seed of the noise.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub pose_noise_seed: u64,
+    /// Whether the poses of test images are fitted before a further score; tables never show that score alone.
+    #[serde(default, skip_serializing_if = "TestPoses::are_given")]
+    pub test_poses: TestPoses,
+    /// How, where they are.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub test_pose: PoseFit,
     /// What is compared, once per seed where there are several.
     #[serde(default)]
     pub variants: Vec<Variant>,
@@ -85,6 +100,15 @@ pub struct Experiment {
     /// How the compared method's repository splits the data.
     #[serde(default)]
     pub splits: Vec<Split>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(number: &u64) -> bool {
+    *number == 0
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// Shape of a table.
@@ -141,9 +165,33 @@ pub struct Column {
     /// Whether the experiment is about it, so that the best is bold: if absent, metrics of frames are, counts are not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outcome: Option<bool>,
+    /// It shows the score after the pose was fitted to the image; the column before it is the one as given.
+    #[serde(skip)]
+    pub fitted: bool,
+}
+
+/// What a column shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shown {
+    /// The metric.
+    pub metric: MetricId,
+    /// With poses fitted to the test images.
+    pub fitted: bool,
+}
+
+impl From<MetricId> for Shown {
+    /// With poses as they are given.
+    fn from(metric: MetricId) -> Self {
+        Self { metric, fitted: false }
+    }
 }
 
 impl Column {
+    /// What it shows.
+    pub fn shown(&self) -> Shown {
+        Shown { metric: self.metric, fitted: self.fitted }
+    }
+
     /// Title of the column.
     pub fn title(&self) -> &str {
         self.title.as_deref().unwrap_or(self.metric.title())
@@ -161,7 +209,7 @@ impl Column {
 }
 
 /// One of the things that a table compares: an avatar and how it is posed.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Variant {
     /// Id, unique in the table.
@@ -180,6 +228,12 @@ pub struct Variant {
     /// SH degree of the colour, 0 to 3, for avatars that are made here.
     #[serde(default)]
     pub sh_degree: Option<u8>,
+    /// Noise on its poses, degrees per joint; the experiment's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_noise: Option<f64>,
+    /// From how many training sequences (takes) of a subject its avatar is made; from the first one if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub takes: Option<u32>,
     /// The variant of the file that this one repeats.
     #[serde(skip)]
     pub replicate: Option<Replicate>,
@@ -310,7 +364,7 @@ impl Experiment {
         let experiment: Self = toml::from_str(text).map_err(|error| toml_error(text, file, &error))?;
         let experiment = grid::expand(experiment, file)?;
         validate::experiment(&experiment, file)?;
-        Ok(seeds::expand(experiment))
+        Ok(poses::expand(seeds::expand(experiment)))
     }
 
     /// The variant of this id.

@@ -1,6 +1,8 @@
 //! Checks of an experiment that its types cannot make.
 
-use super::{AvatarRecipe, Error, Experiment, Paper, Role, Split, Variant, catalog, equivalence, seeds};
+use super::{
+    AvatarRecipe, Error, Experiment, Paper, Role, Split, Variant, catalog, equivalence, poses, seeds,
+};
 use skinsplat_fit::Recipe;
 use std::collections::BTreeSet;
 
@@ -54,6 +56,7 @@ pub(super) fn experiment(e: &Experiment, file: &str) -> Result<(), Error> {
         variant_is_possible(variant, &format!("variants[{i}]"), file)?;
     }
     seeds::check(e, file)?;
+    poses::check(e, file)?;
     equivalence::check(e, file)?;
     stand_in_keeps_its_name(e, file)?;
     if let Some(paper) = &e.paper {

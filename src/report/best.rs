@@ -55,7 +55,7 @@ fn mark_undecided(
         }
         let pair = Pair { candidate: &groups[i], baseline: &groups[best] };
         // Without differences (an infinite number) the printed digits stay what decides.
-        if let Some((_, judgement)) = pair.judged(experiment, over, column.metric) {
+        if let Some((_, judgement)) = pair.judged(experiment, over, column.shown()) {
             cell.best = judgement.verdict != Verdict::Worse;
         }
     }

@@ -8,8 +8,7 @@ use super::layout::{Entry, digits, shape};
 use super::paper::beside;
 use super::replicates::{Group, groups, spread};
 use super::results::{FrameResult, SequenceResults, VariantResults};
-use crate::experiment::{Column, Experiment, Options, PlannedTable, Source};
-use skinsplat_metrics::MetricId;
+use crate::experiment::{Column, Experiment, FittedOutcome, Options, PlannedTable, Source};
 use skinsplat_table::{Cell, Content, RowKind, Table};
 
 /// Failed or missing frames that a footnote names; the others are counted.
@@ -90,7 +89,7 @@ fn measured(experiment: &Experiment, sequence: &SequenceResults, group: &Group, 
     let members = group.on(sequence);
     let missing = members.iter().map(|variant| variant.missing()).sum();
     let cell = |column: &Column| {
-        let contents: Vec<Content> = members.iter().map(|variant| content(variant, column.metric)).collect();
+        let contents: Vec<Content> = members.iter().map(|variant| content(variant, column)).collect();
         let mut cell = over_seeds(&contents, column);
         cell.missing = missing;
         if let Some(reason) = &sequence.missing {
@@ -102,7 +101,12 @@ fn measured(experiment: &Experiment, sequence: &SequenceResults, group: &Group, 
             }
         }
         if cell.content == Content::NotComputed {
-            cell.notes.push(notes.index(not_computed(column)));
+            let unfitted = members.iter().filter(|_| column.fitted).find_map(|variant| unfitted(variant));
+            let note = match unfitted {
+                Some(why) => format!("n/c: {}, {}: {why}", sequence.label, group.label),
+                None => not_computed(column),
+            };
+            cell.notes.push(notes.index(note));
         }
         cell
     };
@@ -124,13 +128,28 @@ fn over_seeds(contents: &[Content], column: &Column) -> Cell {
     Cell::with_spread(mean_content(contents), spread, digits(column))
 }
 
-fn content(variant: &VariantResults, metric: MetricId) -> Content {
-    match variant.value(metric) {
+fn content(variant: &VariantResults, column: &Column) -> Content {
+    match variant.value(column.shown()) {
         Some(value) => Content::number(value),
         None if variant.summary.is_none() => Content::Missing,
-        None if metric.is_of_frames() => Content::NotComputed,
+        None if column.metric.is_of_frames() => Content::NotComputed,
         None => Content::NotApplicable,
     }
+}
+
+/// Frames whose pose could not be fitted: how many, and why the first could not.
+fn unfitted(variant: &VariantResults) -> Option<String> {
+    let failed = |frame: &FrameResult| match &frame.fitted {
+        Some(FittedOutcome::Failed(problem)) => Some(format!("{} ({problem})", frame.name)),
+        Some(FittedOutcome::Scored { .. }) | None => None,
+    };
+    let failed: Vec<String> = variant.frames.iter().filter_map(failed).collect();
+    let first = failed.first()?;
+    Some(format!(
+        "no pose was fitted in {} of {}: {first}",
+        failed.len(),
+        count(variant.frames.len(), "frame")
+    ))
 }
 
 fn not_computed(column: &Column) -> String {
@@ -169,7 +188,7 @@ fn mean(
     let cell = |column: &Column| {
         let of_seed = |&v: &usize| {
             let contents: Vec<Content> =
-                sequences.iter().map(|sequence| content(&sequence.variants[v], column.metric)).collect();
+                sequences.iter().map(|sequence| content(&sequence.variants[v], column)).collect();
             mean_content(&contents)
         };
         let mut cell = over_seeds(&group.members.iter().map(of_seed).collect::<Vec<_>>(), column);
@@ -235,13 +254,14 @@ pub(super) fn comparisons(experiment: &Experiment, sequences: &[SequenceResults]
 fn differences(experiment: &Experiment, over: &[SequenceResults], pair: Pair<'_>) -> Vec<MetricDifference> {
     let columns = experiment.columns.iter().filter(|column| column.metric.is_of_frames());
     let difference = |column: &Column| {
-        let (estimate, judgement) = pair.judged(experiment, over, column.metric).unzip();
+        let (estimate, judgement) = pair.judged(experiment, over, column.shown()).unzip();
         MetricDifference {
             metric: column.metric,
+            fitted: column.fitted,
             decimals: column.decimals(),
             estimate,
             judgement,
-            over_seeds: pair.over_seeds(over, column.metric),
+            over_seeds: pair.over_seeds(over, column.shown()),
         }
     };
     columns.map(difference).collect()

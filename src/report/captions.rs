@@ -6,6 +6,7 @@ use crate::experiment::{
     Variant,
 };
 use skinsplat_data::Capture;
+use std::collections::BTreeSet;
 
 /// The table's caption: of its own data, or the stand-in's, which does not name that data.
 pub(super) fn caption(experiment: &Experiment, source: Source) -> String {
@@ -48,6 +49,7 @@ pub(super) fn ran_on(
         let seeds: Vec<String> = experiment.seeds.iter().map(u64::to_string).collect();
         sentences.push(format!("Mean ± standard deviation over the seeds {}", seeds.join(", ")));
     }
+    sentences.extend(poses(experiment));
     if !options.subset.is_everything() {
         sentences.push(subset(&options.subset));
     }
@@ -55,6 +57,36 @@ pub(super) fn ran_on(
     sentences.extend(planned.remarks.iter().cloned());
     if let Some(average) = &experiment.average {
         sentences.push(format!("{}: each sequence counts once", average.label));
+    }
+    sentences
+}
+
+/// What was done to poses before training and scoring, a sentence each; nothing where they are as the data has them.
+fn poses(experiment: &Experiment) -> Vec<String> {
+    let mut sentences = Vec::new();
+    let noises: BTreeSet<String> = (experiment.variants.iter())
+        .filter_map(|variant| experiment.noise_of(variant))
+        .map(|noise| noise.degrees.to_string())
+        .collect();
+    if !noises.is_empty() {
+        let every = experiment.variants.iter().all(|variant| experiment.noise_of(variant).is_some());
+        let degrees = noises.into_iter().collect::<Vec<_>>().join(", ");
+        let on = if every { "every variant" } else { "the variants that say so" };
+        sentences.push(format!(
+            "Pose noise: {degrees} degrees per joint (root mean square, smooth in time, seed {}) on training and test poses of {on}",
+            experiment.pose_noise_seed
+        ));
+    }
+    if let Some(options) = experiment.fitted_test_poses() {
+        sentences.push(format!(
+            "Test poses: \"as given\" as the data has them, \"fitted\" after {} steps on each test image with the avatar frozen",
+            options.steps
+        ));
+        let printed = experiment.paper.as_ref().map(|paper| paper.test_poses.as_deref());
+        if let Some(printed) = printed {
+            let printed = printed.unwrap_or("the paper does not say whether test poses were fitted");
+            sentences.push(format!("Test poses of the paper's numbers: {printed}"));
+        }
     }
     sentences
 }
@@ -153,6 +185,7 @@ fn origin(source: &AvatarSource) -> String {
                 count(renders.frames.len(), "image")
             )
         }
+        AvatarSource::Missing { problem } => format!("none: {problem}"),
         AvatarSource::Fit { fit, .. } => format!("no file, so fitted by {}", fit.options.recipe.id),
         AvatarSource::Surface { .. } | AvatarSource::Textured { .. } => "made here".to_owned(),
     }

@@ -78,6 +78,10 @@ fn sequence(
         let frames: Vec<FrameResult> = planned.map(|(job, key)| frame(job, key, records)).collect();
         let scores: Vec<FrameScore> = frames.iter().filter_map(|frame| frame.score.clone()).collect();
         let summary = (!scores.is_empty()).then(|| protocol.aggregate(&scores)).transpose();
+        let fitted: Vec<FrameScore> =
+            frames.iter().filter_map(|frame| frame.fitted_score().cloned()).collect();
+        let all_fitted = !fitted.is_empty() && fitted.len() == scores.len();
+        let fitted = all_fitted.then(|| protocol.aggregate(&fitted)).transpose();
         Ok(VariantResults {
             id: variant.id.clone(),
             label: variant.label.clone(),
@@ -85,6 +89,8 @@ fn sequence(
             sh_degree: variant.sh_degree,
             strategy: variant.strategy.clone(),
             summary: summary
+                .map_err(|source| Error::Scores { at: format!("{}, {}", row.id, variant.id), source })?,
+            fitted: fitted
                 .map_err(|source| Error::Scores { at: format!("{}, {}", row.id, variant.id), source })?,
             frames,
         })
@@ -107,9 +113,11 @@ fn frame(job: &Job, key: &str, records: &Records) -> FrameResult {
         score: None,
         visible_splats: None,
         error: None,
+        fitted: None,
     };
     match records.get(key).map(|record| &record.outcome) {
-        Some(Outcome::Scored { score, visible_splats, .. }) => {
+        Some(Outcome::Scored { score, visible_splats, fitted }) => {
+            result.fitted.clone_from(fitted);
             result.score = Some(score.clone());
             result.visible_splats = *visible_splats;
         }

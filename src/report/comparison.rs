@@ -25,6 +25,9 @@ pub struct Comparison {
 pub struct MetricDifference {
     /// The metric.
     pub metric: MetricId,
+    /// With poses fitted to the test images.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub fitted: bool,
     /// Digits after the point.
     pub decimals: usize,
     /// Variant minus baseline; none if no frame was scored for both or one is infinite. With several seeds, each seed's variant
@@ -68,7 +71,15 @@ impl Comparison {
 /// A row per comparison, a column per metric.
 pub(super) fn table(comparisons: &[Comparison]) -> Table {
     let differences = comparisons.first().map_or(&[][..], |first| first.differences.as_slice());
-    let column = |d: &MetricDifference| Column::new(d.metric.id(), format!("Δ {}", d.metric.title()));
+    let fitted_too = differences.iter().any(|d| d.fitted);
+    let column = |d: &MetricDifference| {
+        let (id, title) = (d.metric.id(), d.metric.title());
+        match (fitted_too, d.fitted) {
+            (false, _) => Column::new(id, format!("Δ {title}")),
+            (true, false) => Column::new(id, format!("Δ {title} (as given)")),
+            (true, true) => Column::new(format!("{id}-fitted"), format!("Δ {title} (fitted)")),
+        }
+    };
     Table {
         labels: vec![Label::new("sequence", "Sequence"), Label::new("difference", "Difference")],
         columns: [Column::new("frames", "Frames"), Column::text("covers", "Interval covers")]

@@ -2,8 +2,7 @@
 
 use super::replicates::{Group, spread};
 use super::results::SequenceResults;
-use crate::experiment::Experiment;
-use skinsplat_metrics::MetricId;
+use crate::experiment::{Experiment, Shown};
 use skinsplat_statistics::{Estimate, Judgement, Series, estimate};
 
 /// A row and the row that it is compared with.
@@ -23,8 +22,8 @@ impl Pair<'_> {
     }
 
     /// What the differences in a metric come to over these sequences; none if no frame has both or one is infinite.
-    pub(super) fn estimate(self, over: &[SequenceResults], metric: MetricId) -> Option<Estimate> {
-        estimate(&series(over, &self.members(), metric), metric.higher_is_better()).ok()
+    pub(super) fn estimate(self, over: &[SequenceResults], shown: Shown) -> Option<Estimate> {
+        estimate(&series(over, &self.members(), shown), shown.metric.higher_is_better()).ok()
     }
 
     /// The estimate with what it decides.
@@ -32,28 +31,28 @@ impl Pair<'_> {
         self,
         experiment: &Experiment,
         over: &[SequenceResults],
-        metric: MetricId,
+        shown: Shown,
     ) -> Option<(Estimate, Judgement)> {
-        let found = self.estimate(over, metric)?;
-        let margin = experiment.margin(metric);
-        Some((found, Judgement::new(&found, margin, metric.higher_is_better())))
+        let found = self.estimate(over, shown)?;
+        let margin = experiment.margin(shown.metric);
+        Some((found, Judgement::new(&found, margin, shown.metric.higher_is_better())))
     }
 
     /// Standard deviation of the mean difference over seeds; none from fewer than two.
-    pub(super) fn over_seeds(self, over: &[SequenceResults], metric: MetricId) -> Option<f64> {
+    pub(super) fn over_seeds(self, over: &[SequenceResults], shown: Shown) -> Option<f64> {
         let mean = |member: (usize, usize)| {
-            Some(estimate(&series(over, &[member], metric), metric.higher_is_better()).ok()?.mean)
+            Some(estimate(&series(over, &[member], shown), shown.metric.higher_is_better()).ok()?.mean)
         };
         spread(&self.members().into_iter().map(mean).collect::<Option<Vec<f64>>>()?)
     }
 }
 
 /// Candidate minus baseline, a series per sequence and seed, of the frames that every seed has of both.
-fn series(over: &[SequenceResults], members: &[(usize, usize)], metric: MetricId) -> Vec<Series> {
+fn series(over: &[SequenceResults], members: &[(usize, usize)], shown: Shown) -> Vec<Series> {
     let mut all = Vec::new();
     for sequence in over {
         let difference = |(candidate, baseline): (usize, usize), frame: usize| {
-            let value = |variant: usize| sequence.variants[variant].frames[frame].value(metric);
+            let value = |variant: usize| sequence.variants[variant].frames[frame].value(shown);
             Some(value(candidate)? - value(baseline)?)
         };
         let frames = 0..sequence.variants[members[0].0].frames.len();

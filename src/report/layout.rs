@@ -43,7 +43,9 @@ pub(super) fn direction(column: &experiment::Column) -> Direction {
 }
 
 fn column(column: &experiment::Column) -> Column {
-    Column::new(column.metric.id(), column.title()).digits(digits(column)).better(direction(column))
+    let id =
+        if column.fitted { format!("{}-fitted", column.metric.id()) } else { column.metric.id().to_owned() };
+    Column::new(id, column.title()).digits(digits(column)).better(direction(column))
 }
 
 /// With how many digits a column is printed.

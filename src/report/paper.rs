@@ -82,7 +82,7 @@ fn entry(experiment: &Experiment, row: &PaperRow, sequence: &str, variant: &str,
     };
     let cells = experiment.columns.iter().map(|column| {
         let doubtful = row.doubt.as_ref().is_some_and(|doubt| doubt.starts_with(column.metric.id()));
-        let printed = row.value(column.metric);
+        let printed = row.value(column.metric).filter(|_| !column.fitted);
         printed.map_or_else(Cell::empty, |p| cell(p, row.bold.contains(&column.metric), doubtful))
     });
     Entry {

@@ -2,9 +2,9 @@
 //! the machine. `reports/SCHEMA.md` describes it key by key.
 
 use super::comparison::Comparison;
-use crate::experiment::{AvatarRecipe, CodeVersions, Options, Source};
+use crate::experiment::{AvatarRecipe, CodeVersions, FittedOutcome, Options, Shown, Source};
 use serde::{Deserialize, Serialize};
-use skinsplat_metrics::{FrameScore, MetricId, ProtocolId, Summary};
+use skinsplat_metrics::{FrameScore, ProtocolId, Summary};
 use skinsplat_table::{Digits, Table, to_json};
 
 /// Version of the document's format.
@@ -145,6 +145,9 @@ pub struct VariantResults {
     pub strategy: Option<String>,
     /// The metrics over the scored frames, aggregated as the protocol says; none without a scored frame.
     pub summary: Option<Summary>,
+    /// The same with every pose fitted to its image; none unless that was asked for and every scored frame has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<Summary>,
     /// Every planned frame, in order.
     pub frames: Vec<FrameResult>,
 }
@@ -160,9 +163,10 @@ impl VariantResults {
         self.frames.len() - self.scored()
     }
 
-    /// The metric over the scored frames.
-    pub fn value(&self, metric: MetricId) -> Option<f64> {
-        self.summary.as_ref()?.value(metric)
+    /// What a column shows of the scored frames.
+    pub fn value(&self, shown: impl Into<Shown>) -> Option<f64> {
+        let Shown { metric, fitted } = shown.into();
+        if fitted { self.fitted.as_ref() } else { self.summary.as_ref() }?.value(metric)
     }
 }
 
@@ -182,11 +186,24 @@ pub struct FrameResult {
     pub visible_splats: Option<u64>,
     /// Why it failed.
     pub error: Option<String>,
+    /// What came of it with its pose fitted to the image, where that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<FittedOutcome>,
 }
 
 impl FrameResult {
-    /// The frame's own value of a metric; none for what only an avatar has.
-    pub fn value(&self, metric: MetricId) -> Option<f64> {
-        self.score.as_ref()?.value(metric).filter(|_| metric.is_of_frames())
+    /// The frame's own value of what a column shows; none for what only an avatar has.
+    pub fn value(&self, shown: impl Into<Shown>) -> Option<f64> {
+        let Shown { metric, fitted } = shown.into();
+        let score = if fitted { self.fitted_score() } else { self.score.as_ref() };
+        score?.value(metric).filter(|_| metric.is_of_frames())
+    }
+
+    /// Its score with the pose fitted.
+    pub fn fitted_score(&self) -> Option<&FrameScore> {
+        match self.fitted.as_ref()? {
+            FittedOutcome::Scored { score, .. } => Some(score),
+            FittedOutcome::Failed(_) => None,
+        }
     }
 }

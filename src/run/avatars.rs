@@ -9,6 +9,7 @@ use super::textured::TexturedFiles;
 use super::{Error, Event, Library};
 use crate::experiment::{AvatarSource, Plan, PlannedAvatar, PlannedFit, TrainingFrames};
 use skinsplat_data::{Sequence, ply};
+use skinsplat_fit::recipe::Poses;
 use skinsplat_fit::surface::{SurfaceInit, surface_init};
 use skinsplat_fit::texture::{TextureInit, gather_texture};
 use std::borrow::Cow;
@@ -49,6 +50,7 @@ impl<'a> Workshop<'a> {
                 let body = &self.library.sequence(&avatar.dataset, &avatar.subject, sequence)?.body;
                 Ok(Drawable::read(path, body)?.0)
             }
+            AvatarSource::Missing { problem } => Err(Error::Avatar { problem: problem.clone() }),
             AvatarSource::Renders(renders) => Ok(Drawable::Renders(Box::new(renders.clone()))),
             AvatarSource::Surface { training, placement, bind_to, sh_degree, edge_mm } => {
                 let init = SurfaceInit {
@@ -110,11 +112,14 @@ impl<'a> Workshop<'a> {
         planned: &PlannedFit,
         training: &Sequence,
     ) -> Result<Drawable<'static>, Error> {
-        let parts: &[&str] = match planned.options.recipe.mesh {
-            Some(_) => &["ply", "json", "texture.png", "vertices.npy"],
-            None => &["ply", "json"],
-        };
-        let entry = Entry::new(self.folder, &avatar.key, parts);
+        let mut parts = vec!["ply", "json"];
+        if planned.options.recipe.mesh.is_some() {
+            parts.extend(["texture.png", "vertices.npy"]);
+        }
+        if planned.options.recipe.poses == Poses::Refine {
+            parts.push("poses.json");
+        }
+        let entry = Entry::new(self.folder, &avatar.key, &parts);
         let start = Entry::new(self.folder, &planned.start, &["ply"]);
         let files = FitFiles { avatar: entry.path("ply"), start: Some(start) };
         let watch = self.watch;
@@ -122,6 +127,12 @@ impl<'a> Workshop<'a> {
             |damage| warn(watch, damage),
             || {
                 let tests = self.curves.of(avatar, self.library)?;
+                let noise = avatar.training().and_then(|training| training.noise);
+                let noisy = |test: &Sequence| {
+                    noise
+                        .map_or_else(|| test.clone(), |noise| test.with_pose_noise(noise.degrees, noise.seed))
+                };
+                let tests: Vec<Sequence> = tests.iter().map(noisy).collect();
                 let name = format!("{}/{}/{}", avatar.dataset, avatar.subject, training.id);
                 let fit = || fit_into(&files, planned, training, &name, &tests, watch);
                 // The name of a checkpoint here is that of its fit: one that does not belong to it is damaged or of another
@@ -141,9 +152,20 @@ impl<'a> Workshop<'a> {
 
     /// The frames that an avatar is made from.
     fn training(&self, avatar: &PlannedAvatar, training: &TrainingFrames) -> Result<Sequence, Error> {
-        let TrainingFrames { sequence, frames, resolution } = training;
-        let whole = self.library.sequence(&avatar.dataset, &avatar.subject, sequence)?;
-        let selected = whole.selected(frames)?;
+        let TrainingFrames { sequence, frames, resolution, further, noise } = training;
+        let take = |id: &str, frames: &[usize]| -> Result<Sequence, Error> {
+            let whole = self.library.sequence(&avatar.dataset, &avatar.subject, id)?;
+            let selected = whole.selected(frames)?;
+            Ok(noise.map_or_else(
+                || selected.clone(),
+                |noise| selected.with_pose_noise(noise.degrees, noise.seed),
+            ))
+        };
+        let first = std::iter::once(take(sequence, frames));
+        let takes = first
+            .chain(further.iter().map(|(id, frames)| take(id, frames)))
+            .collect::<Result<Vec<_>, _>>()?;
+        let selected = Sequence::joined(&takes)?;
         Ok(match resolution {
             Some(side) => selected.reduced(*side),
             None => selected,

@@ -4,7 +4,10 @@ use super::foreign::{self, OnBody};
 use super::{Error, renders};
 use crate::experiment::RenderedFrames;
 use skinsplat_core::scene::{Avatar, Camera, Image, Mask, Pose, PosedBody, Rendered, RestBody, SceneError};
+use skinsplat_data::Truth;
 use skinsplat_data::avatar::read_avatar;
+use skinsplat_fit::options::PoseFit;
+use skinsplat_fit::pose_fit::{FittedPose, Posable, Target, fit_pose};
 use skinsplat_fit::texture::{SAMPLES, TexturedBody};
 use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
 use skinsplat_render::View;
@@ -200,6 +203,33 @@ impl<'m> Drawable<'m> {
             Self::Textured(mesh) => draw_mesh(mesh, view, look),
             Self::Renders(renders) => load_render(renders, view, look),
         }
+    }
+}
+
+impl Drawable<'_> {
+    /// Fits the pose of a view to its truth, everything else frozen. The background is the protocol's colour; a picture behind
+    /// counts as black, on both sides.
+    ///
+    /// # Errors
+    /// What no pose moves: frames of another program, a mesh without Gaussians. As [`fit_pose`].
+    pub(super) fn fit_pose(
+        &self,
+        view: &PosedView<'_>,
+        truth: &Truth,
+        look: &Look<'_>,
+        options: &PoseFit,
+    ) -> Result<FittedPose, Error> {
+        let (Bound { avatar, body }, mesh) = match self {
+            Self::Gaussians(bound) => (&**bound, None),
+            Self::Hybrid(bound, mesh) => (&**bound, Some(&**mesh)),
+            Self::Textured(_) | Self::Renders(_) => return Err(Error::NoPoseToFit),
+        };
+        let strategy = look.strategy.ok_or(Error::NoStrategy)?;
+        let body = body.as_deref().unwrap_or(view.body.rest);
+        let posable = Posable { bound: avatar, body, mesh, strategy: &strategy };
+        let (background, antialiased) = (look.background.colour(), look.antialiased);
+        let target = Target { truth, camera: view.camera, background, antialiased };
+        Ok(fit_pose(&posable, &target, view.pose, options)?)
     }
 }
 

@@ -55,6 +55,12 @@ pub enum Error {
     /// Gaussians that are to be drawn without a strategy.
     #[error("strategy: missing; expected one, since the avatar has Gaussians to pose")]
     NoStrategy,
+    /// A pose that is to be fitted where none is read.
+    #[error("fitted pose: the frame was not drawn from Gaussians; expected an avatar that a pose moves")]
+    NoPoseToFit,
+    /// Noise on the poses of frames that another program rendered.
+    #[error("pose_noise: the frame was rendered by another program; expected an avatar that a pose moves")]
+    NoPoseToDisturb,
     /// A test sequence on which nothing can be scored.
     #[error("sequence {sequence}: frames: none; expected at least one to score")]
     NoTestFrames {

@@ -5,8 +5,9 @@ use super::drawable::{Drawable, Drawn, Look, Scratch};
 use super::frame::{Frame, Scored, behind, check_background};
 use super::store::Store;
 use super::{Error, Library};
-use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
+use crate::experiment::{FittedOutcome, FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
 use rayon::prelude::*;
+use skinsplat_core::scene::Pose;
 use skinsplat_data::{Sequence, Truth};
 use skinsplat_fit::train::Step;
 use skinsplat_metrics::lpips::{NetworkSource, OneFrame};
@@ -154,7 +155,9 @@ fn run_frame(
     for job in jobs {
         for variant in &job.variants {
             let outcome = frame.as_ref().map_err(Clone::clone).and_then(|frame| {
-                run_variant(job, variant, frame, &avatars[&variant.avatar], &distances, scratch)
+                let noisy = noisy_pose(variant, sequence.as_ref().ok(), first.frame);
+                let avatar = &avatars[&variant.avatar];
+                run_variant(job, variant, (frame, noisy), avatar, &distances, scratch)
                     .map_err(|error| error.to_string())
             });
             let (outcome, seconds) =
@@ -178,19 +181,39 @@ pub(super) fn look<'a>(job: &Job, variant: &JobVariant, truth: &'a Truth) -> Res
     Ok(Look { strategy: variant.strategy, background, antialiased: job.antialiased })
 }
 
+/// The pose of a frame with the variant's noise, if it has any.
+pub(super) fn noisy_pose(variant: &JobVariant, sequence: Option<&Sequence>, frame: usize) -> Option<Pose> {
+    let (noise, sequence) = (variant.noise?, sequence?);
+    Some(sequence.noisy_pose(sequence.frames[frame].pose, noise.degrees, noise.seed))
+}
+
 fn run_variant(
     job: &Job,
     variant: &JobVariant,
-    frame: &Frame<'_>,
+    (frame, noisy): (&Frame<'_>, Option<Pose>),
     avatar: &Built,
     distances: &dyn PerceptualDistance,
     scratch: &mut Scratch,
 ) -> Result<(Outcome, Seconds), Error> {
     let avatar = avatar.as_ref().map_err(|problem| Error::Avatar { problem: problem.clone() })?;
     let wanted = Wanted { lpips: Some(distances), ..Wanted::of(&job.metrics) };
+    if noisy.is_some() && matches!(avatar, Drawable::Renders(_)) {
+        return Err(Error::NoPoseToDisturb);
+    }
+    let noisy_view = noisy.as_ref().map(|pose| frame.in_pose(pose)).transpose()?;
+    let view = noisy_view.as_ref().unwrap_or(&frame.view);
+    let look = look(job, variant, &frame.truth)?;
     let Scored { score, drawn, score_seconds } =
-        frame.evaluate(avatar, &look(job, variant, &frame.truth)?, &job.protocol, wanted, scratch)?;
+        frame.evaluate_view(view, avatar, &look, &job.protocol, wanted, scratch)?;
+    let fitted = variant.fitted.as_ref().map(|options| {
+        let fitted = avatar.fit_pose(view, &frame.truth, &look, options).and_then(|found| {
+            let view = frame.in_pose(&found.pose)?;
+            let scored = frame.evaluate_view(&view, avatar, &look, &job.protocol, wanted, scratch)?;
+            Ok(FittedOutcome::Scored { score: scored.score, turned_degrees: found.turned_degrees })
+        });
+        fitted.unwrap_or_else(|error| FittedOutcome::Failed(error.to_string()))
+    });
     let Drawn { visible_splats, pose_seconds, render_seconds, .. } = drawn;
     let seconds = Seconds { pose: pose_seconds, render: render_seconds, score: score_seconds };
-    Ok((Outcome::Scored { score, visible_splats }, seconds))
+    Ok((Outcome::Scored { score, visible_splats, fitted }, seconds))
 }

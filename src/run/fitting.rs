@@ -4,6 +4,7 @@
 use super::Error;
 use super::cache::{self, Entry};
 use super::held_out::{HeldOut, held_out};
+use super::refined_poses;
 use super::textured::TexturedFiles;
 use crate::experiment::CodeVersions;
 use serde::{Deserialize, Serialize};
@@ -40,6 +41,11 @@ impl FitFiles {
     /// The sidecar beside the avatar.
     pub fn sidecar(&self) -> PathBuf {
         self.avatar.with_extension("json")
+    }
+
+    /// The refined poses of the training frames beside the avatar, of a recipe that refines them.
+    pub fn poses(&self) -> PathBuf {
+        self.avatar.with_extension("poses.json")
     }
 
     /// The mesh of a hybrid, beside the avatar.
@@ -137,7 +143,7 @@ pub fn fit(
         None => started(sequence, options, files, tests, &mut progress, watch)?,
     };
     iterate(&mut trainer, options, tests, &path, &mut progress, watch)?;
-    write_avatar(&trainer, files)?;
+    write_avatar(&trainer, files, sequence)?;
     progress.held_out.extend(score_end(&trainer, files, sequence, options, tests)?);
     let report = progress.report(&trainer, trained_on, sequence, options);
     write_report(&files.sidecar(), &report)?;
@@ -197,8 +203,14 @@ fn iterate(
     Ok(())
 }
 
-/// Writes the Gaussians, and the mesh of a hybrid; one of an earlier fit under this name goes.
-fn write_avatar(trainer: &Trainer<'_>, files: &FitFiles) -> Result<(), Error> {
+/// Writes the Gaussians, the mesh of a hybrid and the poses that were refined; those of an earlier fit under this name go.
+fn write_avatar(trainer: &Trainer<'_>, files: &FitFiles, sequence: &Sequence) -> Result<(), Error> {
+    match trainer.poses() {
+        Some(refined) => refined_poses::write(&files.poses(), sequence, &refined)?,
+        None => {
+            cache::remove(&files.poses())?;
+        }
+    }
     let mesh = files.mesh();
     match trainer.fitted().mesh {
         Some(fitted) => mesh.write(fitted)?,
@@ -257,7 +269,7 @@ fn start(
 }
 
 /// How checkpoint files begin; the SHA-256 of what follows it comes next.
-const CHECKPOINT: &[u8] = b"skinsplat checkpoint 2\n";
+const CHECKPOINT: &[u8] = b"skinsplat checkpoint 3\n";
 
 /// What a checkpoint file holds.
 #[derive(Debug, Default, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use super::Error;
 use super::drawable::{Behind, Drawable, Drawn, Look, PosedView, Scratch};
-use skinsplat_core::scene::PosedBody;
+use skinsplat_core::scene::{Pose, PosedBody};
 use skinsplat_data::{FrameSource, Sequence, Truth};
 use skinsplat_metrics::{AvatarStats, FrameScore, Protocol, Wanted};
 use skinsplat_posing::face_spreads;
@@ -47,6 +47,15 @@ impl<'a> Frame<'a> {
         Ok(Self { truth, view, bend: OnceLock::new() })
     }
 
+    /// The view of the frame in another pose.
+    ///
+    /// # Errors
+    /// A pose of another body.
+    pub(super) fn in_pose<'p>(&'p self, pose: &'p Pose) -> Result<PosedView<'p>, Error> {
+        let PosedView { camera, ref body, name, stored, .. } = self.view;
+        Ok(PosedView { pose, camera, body: PosedBody::new(body.rest, pose)?, name, stored })
+    }
+
     /// Draws the frame and scores the drawing.
     ///
     /// # Errors
@@ -59,7 +68,23 @@ impl<'a> Frame<'a> {
         wanted: Wanted<'_>,
         scratch: &mut Scratch,
     ) -> Result<Scored, Error> {
-        let drawn = drawable.draw(&self.view, look, scratch)?;
+        self.evaluate_view(&self.view, drawable, look, protocol, wanted, scratch)
+    }
+
+    /// The same for a view of [`Frame::in_pose`].
+    ///
+    /// # Errors
+    /// As [`Frame::evaluate`].
+    pub(super) fn evaluate_view(
+        &self,
+        view: &PosedView<'_>,
+        drawable: &Drawable<'_>,
+        look: &Look<'_>,
+        protocol: &Protocol,
+        wanted: Wanted<'_>,
+        scratch: &mut Scratch,
+    ) -> Result<Scored, Error> {
+        let drawn = drawable.draw(view, look, scratch)?;
         let bend = match wanted.metrics.iter().any(|metric| metric.needs_bend()) {
             true => Some(self.bend()?),
             false => None,

@@ -4,7 +4,7 @@
 //! its absolute error, four times enlarged.
 
 use super::drawable::{Behind, Scratch};
-use super::execute::{look, prepare_avatars, test_sequence};
+use super::execute::{look, noisy_pose, prepare_avatars, test_sequence};
 use super::frame::{Frame, behind};
 use super::{Error, Event, Library};
 use crate::experiment::{Job, Outcome, Plan, Records};
@@ -49,7 +49,10 @@ pub fn write(
             let avatar = avatars[&variant.avatar]
                 .as_ref()
                 .map_err(|problem| Error::Avatar { problem: problem.clone() })?;
-            images.push(avatar.draw(&frame.view, &look(job, variant, &frame.truth)?, &mut scratch)?.image);
+            let noisy = noisy_pose(variant, Some(&sequence), job.frame);
+            let noisy_view = noisy.as_ref().map(|pose| frame.in_pose(pose)).transpose()?;
+            let view = noisy_view.as_ref().unwrap_or(&frame.view);
+            images.push(avatar.draw(view, &look(job, variant, &frame.truth)?, &mut scratch)?.image);
         }
         let truth = match behind(&job.protocol, &frame.truth)? {
             Behind::Colour(colour) => frame.truth.rgb.composited(&frame.truth.alpha, colour)?,

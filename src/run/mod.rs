@@ -6,7 +6,7 @@
 //! draws them in poses that no frame has.
 //!
 //! Each file imports only from those before it in this list: `textured`, `foreign`, `drawable`, `library`, `frame`,
-//! `held_out`, `cache`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`, `pictures`, `motion`.
+//! `held_out`, `cache`, `refined_poses`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`, `pictures`, `motion`.
 
 mod avatars;
 pub mod cache;
@@ -26,6 +26,7 @@ mod library;
 pub mod motion;
 pub mod pictures;
 pub mod provenance;
+mod refined_poses;
 pub mod renders;
 pub mod store;
 pub mod textured;

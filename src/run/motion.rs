@@ -135,9 +135,11 @@ fn scenes(plan: &Plan) -> Vec<&Job> {
     plan.jobs.iter().filter(|job| seen.insert((job.table, &job.dataset, &job.subject))).collect()
 }
 
-/// True unless a variant's avatar is a folder of renders, which show the test frames and nothing else.
+/// True unless a variant's avatar is a folder of renders, which show the test frames and nothing else, or there is none.
 fn moves(plan: &Plan, variant: &JobVariant) -> bool {
-    plan.avatar(&variant.avatar).is_none_or(|avatar| !matches!(avatar.source, AvatarSource::Renders(_)))
+    let still =
+        |source: &AvatarSource| matches!(source, AvatarSource::Renders(_) | AvatarSource::Missing { .. });
+    plan.avatar(&variant.avatar).is_none_or(|avatar| !still(&avatar.source))
 }
 
 /// Where the pictures of a job's subject lie: subjects of several data sets may share a name.

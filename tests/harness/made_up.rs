@@ -104,7 +104,7 @@ pub(super) fn record(key: &str, outcome: Outcome) -> FrameRecord {
 }
 
 pub(super) fn scored(key: &str, score: FrameScore) -> FrameRecord {
-    record(key, Outcome::Scored { score, visible_splats: Some(90) })
+    record(key, Outcome::Scored { score, visible_splats: Some(90), fitted: None })
 }
 
 /// A score for everything in the plan: frame k of variant v in row r has PSNR `20 + r + v / 2 + k / 10`.

@@ -10,6 +10,7 @@ mod formats;
 mod made_up;
 mod metrics;
 mod plans;
+mod poses;
 mod reports;
 mod stores;
 mod verdicts;

@@ -49,4 +49,15 @@ pub fn assert_gradient(posed: &OwnedPosed, gradient: &PosedGradient, loss: impl 
     assert_close("factors", &found, &factors, 1e-5);
     assert_close("opacities", &gradient.opacities, &opacities, 1e-5);
     assert_close("sh", gradient.sh.as_flattened(), &sh, 1e-5);
+    let frames = posed.view_frames.as_ref().map_or(0, Vec::len);
+    assert_eq!(gradient.view_frames.len(), frames);
+    let expected: Vec<f64> = (0..9 * frames).map(|i| along(1e-4, &|p| frame_entry(p, i))).collect();
+    let found: Vec<f32> = gradient.view_frames.iter().flat_map(Mat3::to_cols_array).collect();
+    assert_close("view frames", &found, &expected, 1e-5);
+}
+
+/// Entry `i` of all view frames, column by column.
+fn frame_entry(posed: &mut OwnedPosed, i: usize) -> &mut f32 {
+    let frames = posed.view_frames.as_mut().expect("asked only where there are some");
+    &mut frames[i / 9].col_mut(i % 9 / 3)[i % 3]
 }

@@ -47,6 +47,7 @@ pub mod npy;
 pub mod npz;
 pub mod pickle;
 pub mod ply;
+pub mod pose_noise;
 pub mod poses;
 mod reduce;
 pub mod select;

@@ -181,6 +181,47 @@ impl Sequence {
         Ok(Self { frames: frames.iter().map(frame).collect::<Result<_, _>>()?, ..self.clone() })
     }
 
+    /// Several takes of one subject as one sequence, in this order, which keeps the first one's id. Frames carry the id of their
+    /// take before their name.
+    ///
+    /// # Errors
+    /// No take; takes on other bodies, since an avatar hangs on one.
+    pub fn joined(takes: &[Self]) -> Result<Self, Error> {
+        let [first, others @ ..] = takes else {
+            return Err(Error::invalid("takes", "sequences", "none", "at least one"));
+        };
+        if let Some(other) = others.iter().find(|take| *take.body != *first.body) {
+            let problem = format!("it has another body than {}", first.id);
+            return Err(Error::invalid(&other.id, "body", problem, "takes of one subject on one body"));
+        }
+        if others.is_empty() {
+            return Ok(first.clone());
+        }
+        let (mut poses, mut cameras, mut frames, mut stored) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for take in takes {
+            let moved = |frame: &FrameRef| FrameRef {
+                name: format!("{}/{}", take.id, frame.name),
+                pose: frame.pose + poses.len(),
+                camera: frame.camera + cameras.len(),
+                ..frame.clone()
+            };
+            frames.extend(take.frames.iter().map(moved));
+            stored.extend((0..take.cameras.len()).map(|camera| take.stored_size(camera)));
+            poses.extend(take.poses.iter().cloned());
+            cameras.extend(take.cameras.iter().cloned());
+        }
+        let (id, body) = (first.id.clone(), first.body.clone());
+        Ok(Self {
+            id,
+            body,
+            poses: poses.into(),
+            cameras: cameras.into(),
+            frames,
+            stored_sizes: Some(stored),
+        })
+    }
+
     /// The true image of a frame, of the size of its camera.
     ///
     /// # Errors

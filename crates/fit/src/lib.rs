@@ -18,6 +18,8 @@ mod frame_order;
 mod gather;
 mod loss;
 pub mod options;
+pub mod pose_fit;
+mod poses;
 pub mod recipe;
 mod room;
 pub mod shape;

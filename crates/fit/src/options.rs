@@ -170,6 +170,121 @@ impl Default for Schedule {
     }
 }
 
+/// How the poses of training frames are fitted with the avatar (`poses = "refine"`): one state of Adam per pose, over a rotation
+/// vector per joint and the translation of the body.
+///
+/// HUGS takes 1e-4 for both over 250 visits of a frame, HAHA 2e-4 over 400 (`cfg_files/release/neuman`, `configs` of their
+/// repositories): rates times visits, which is how far a pose can go, are what the rates here are set to reach with fewer visits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PoseRefinement {
+    /// Learning rate of joint rotations, radians per visit of a frame.
+    pub rate: f32,
+    /// Learning rate of the translation, metres per visit.
+    pub translation_rate: f32,
+    /// What both are multiplied by at the last iteration; in between they fall by a constant factor per iteration.
+    pub decay: f32,
+    /// Share of the iterations before which poses stay as they are given: an avatar that shows nothing yet pulls them astray.
+    pub from: f32,
+    /// A joint that turns further than this from the given pose has lost its way, degrees: its pose is fitted no further.
+    pub most_degrees: f64,
+    /// Of Adam. Its ε keeps joints that hardly move a pixel from wandering.
+    pub moments: Moments,
+}
+
+impl Default for PoseRefinement {
+    fn default() -> Self {
+        Self {
+            rate: 1e-2,
+            translation_rate: 2e-3,
+            decay: 0.1,
+            from: 0.1,
+            most_degrees: 60.0,
+            moments: Moments::with_epsilon(1e-5),
+        }
+    }
+}
+
+impl PoseRefinement {
+    /// True for the values of [`Default`].
+    pub(crate) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    pub(crate) fn check(&self, section: &str) -> Result<(), Error> {
+        within(
+            section,
+            &[
+                ("rate", f64::from(self.rate), NOT_NEGATIVE),
+                ("translation_rate", f64::from(self.translation_rate), NOT_NEGATIVE),
+                ("decay", f64::from(self.decay), f64::MIN_POSITIVE..=1.0),
+                ("from", f64::from(self.from), SHARE),
+                ("most_degrees", self.most_degrees, f64::MIN_POSITIVE..=180.0),
+            ],
+        )?;
+        self.moments.check(&format!("{section}.moments"))
+    }
+}
+
+/// How the pose of a test image is fitted with the avatar frozen ([`crate::pose_fit`]). HAHA takes 100 steps of gradient descent.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PoseFit {
+    /// Steps of Adam.
+    pub steps: u32,
+    /// Learning rate of joint rotations at the first step, radians.
+    pub rate: f32,
+    /// Learning rate of the translation at the first step, metres.
+    pub translation_rate: f32,
+    /// What both are multiplied by at the last step; in between they fall by a constant factor.
+    pub decay: f32,
+    /// A joint that turns further than this from the given pose has lost its way, degrees: the fit has failed.
+    pub most_degrees: f64,
+    /// Share of `1 - SSIM` in the colour term; the rest is L1.
+    pub ssim: f32,
+    /// Weight of the L1 distance of the silhouettes.
+    pub silhouette: f32,
+    /// Of Adam.
+    pub moments: Moments,
+}
+
+impl Default for PoseFit {
+    fn default() -> Self {
+        Self {
+            steps: 60,
+            rate: 1e-2,
+            translation_rate: 3e-3,
+            decay: 0.05,
+            most_degrees: 60.0,
+            ssim: 0.2,
+            silhouette: 0.1,
+            moments: Moments::with_epsilon(1e-5),
+        }
+    }
+}
+
+impl PoseFit {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Names the first field out of range, below `section`.
+    pub fn check(&self, section: &str) -> Result<(), Error> {
+        within(
+            section,
+            &[
+                ("steps", f64::from(self.steps), 1.0..=1e5),
+                ("rate", f64::from(self.rate), NOT_NEGATIVE),
+                ("translation_rate", f64::from(self.translation_rate), NOT_NEGATIVE),
+                ("decay", f64::from(self.decay), f64::MIN_POSITIVE..=1.0),
+                ("most_degrees", self.most_degrees, f64::MIN_POSITIVE..=180.0),
+                ("ssim", f64::from(self.ssim), SHARE),
+                ("silhouette", f64::from(self.silhouette), NOT_NEGATIVE),
+            ],
+        )?;
+        self.moments.check(&format!("{section}.moments"))
+    }
+}
+
 /// A field, its value, and the values that it may have.
 pub(crate) type Bound = (&'static str, f64, RangeInclusive<f64>);
 

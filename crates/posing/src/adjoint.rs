@@ -1,13 +1,16 @@
 //! Posing walked backwards: from derivatives with respect to [`Posed`] to those with respect to the stored parameters of
-//! the avatar, a chunk of Gaussians at a time.
+//! the avatar and, where they are asked for, to the posed body ([`super::body_adjoint`]), a chunk of Gaussians at a time.
 //!
 //! [`Posed`]: skinsplat_core::scene::Posed
 
+use super::body_adjoint::{self, OfBody};
 use super::bound::Moves;
+use super::covariance::CovarianceGradient;
 use super::error::expect_count;
 use super::frame::{Frame, Visitor};
 use super::lanes::{self, LANES, Lanes, put, take};
 use super::layout::{Block, CHUNK};
+use super::options::Gradients;
 use super::push_forward::Derivative;
 use super::rotate::{BlockInput, Rotated, drawn_adjoint, means_adjoint, polar_adjoint, rotation_adjoint};
 use super::surfel::Disc;
@@ -15,56 +18,91 @@ use super::{Across, BoundAvatar, ColourChoice, CovarianceChoice, PosingError, co
 use glam::Vec3;
 use rayon::prelude::*;
 use skinsplat_core::math::{Matrix3, Quaternion, dot4, matrix3, rotation};
-use skinsplat_core::scene::{AvatarGradient, Gaussians, PosedGradient, SceneError};
+use skinsplat_core::scene::{AvatarGradient, BodyGradient, Gaussians, PosedGradient, SceneError};
 
-/// Adds to `gradient` what the pose of a frame contributes. See [`Poser::backward`](super::Poser::backward).
+/// Adds to `into` what the pose of a frame contributes. See [`Poser::backward`](super::Poser::backward).
 pub(super) fn add(
     frame: &Frame<'_>,
     gaussians: &Gaussians,
     upstream: &PosedGradient,
-    gradient: &mut AvatarGradient,
+    into: Gradients<'_>,
 ) -> Result<(), PosingError> {
-    check(frame.bound, gaussians, upstream, gradient)?;
-    let parts = Part::split(gradient, frame.bound.sh_count());
-    parts.into_par_iter().enumerate().for_each(|(number, gradient)| {
+    let Gradients { avatar, body } = into;
+    check(frame.bound, upstream)?;
+    if let Some(gradient) = &avatar {
+        check_avatar(frame.bound, gaussians, gradient)?;
+    }
+    if let Some(gradient) = &body {
+        check_body(frame, gradient)?;
+    }
+    let count = frame.bound.len().div_ceil(CHUNK);
+    let parts: Vec<Option<Part<'_>>> = match avatar {
+        Some(gradient) => Part::split(gradient, frame.bound.sh_count()).into_iter().map(Some).collect(),
+        None => (0..count).map(|_| None).collect(),
+    };
+    let run = |(number, gradient)| {
         let start = number * CHUNK;
-        AdjointChunk {
+        let length = CHUNK.min(frame.bound.len() - start);
+        let of_body = body.is_some().then(|| OfBody::new(frame, length));
+        let (relative, growth, rest_means) = Default::default();
+        let chunk = AdjointChunk {
             frame,
             gaussians,
             upstream,
             number,
             start,
+            length,
             gradient,
-            relative: Vec::new(),
-            growth: Vec::new(),
-            rest_means: Vec::new(),
-        }
-        .run();
-    });
+            of_body,
+            relative,
+            growth,
+            rest_means,
+        };
+        chunk.run()
+    };
+    let of_body: Vec<Option<OfBody>> = parts.into_par_iter().enumerate().map(run).collect();
+    if let Some(gradient) = body {
+        let of_body: Vec<OfBody> = of_body.into_iter().flatten().collect();
+        body_adjoint::gather(frame, upstream, &of_body, gradient);
+    }
     Ok(())
 }
 
-fn check(
-    bound: &BoundAvatar,
-    gaussians: &Gaussians,
-    upstream: &PosedGradient,
-    gradient: &AvatarGradient,
-) -> Result<(), SceneError> {
-    bound.check_counts(gaussians)?;
-    let (n, coefficients) = (bound.len(), bound.sh.len());
-    expect_count("f_dc/f_rest", gaussians.sh.len(), coefficients)?;
+fn check(bound: &BoundAvatar, upstream: &PosedGradient) -> Result<(), SceneError> {
+    let n = bound.len();
     expect_count("gradient of the posed means", upstream.means.len(), n)?;
     expect_count("gradient of the factors", upstream.factors.len(), n)?;
     expect_count("gradient of the opacities", upstream.opacities.len(), n)?;
-    expect_count("gradient of the posed SH", upstream.sh.len(), coefficients)?;
+    expect_count("gradient of the posed SH", upstream.sh.len(), bound.sh.len())?;
+    match upstream.view_frames.len() {
+        0 => Ok(()),
+        found => expect_count("gradient of the view frames", found, n),
+    }
+}
+
+fn check_avatar(
+    bound: &BoundAvatar,
+    gaussians: &Gaussians,
+    gradient: &AvatarGradient,
+) -> Result<(), SceneError> {
+    bound.check_counts(gaussians)?;
+    let n = bound.len();
+    expect_count("f_dc/f_rest", gaussians.sh.len(), bound.sh.len())?;
     expect_count("gradient of x, y, z", gradient.means.len(), n)?;
     expect_count("gradient of rot", gradient.rotations.len(), n)?;
     expect_count("gradient of scale", gradient.log_scales.len(), n)?;
     expect_count("gradient of opacity", gradient.opacity_logits.len(), n)?;
-    expect_count("gradient of f_dc/f_rest", gradient.sh.len(), coefficients)?;
+    expect_count("gradient of f_dc/f_rest", gradient.sh.len(), bound.sh.len())?;
     let embedded = if bound.moves == Moves::WithFaces { n } else { 0 };
     expect_count("gradient of barycentric", gradient.barycentric.len(), embedded)?;
     expect_count("gradient of offset", gradient.offsets.len(), embedded)
+}
+
+fn check_body(frame: &Frame<'_>, gradient: &BodyGradient) -> Result<(), SceneError> {
+    let joints = frame.body.joints.len();
+    expect_count("gradient of the joints", gradient.linear.len(), joints)?;
+    expect_count("gradient of the joints' translations", gradient.translations.len(), joints)?;
+    expect_count("gradient of the joints' rotations", gradient.torques.len(), joints)
 }
 
 /// One chunk's part of an [`AvatarGradient`].
@@ -112,7 +150,12 @@ struct AdjointChunk<'f, 'a, 'o> {
     number: usize,
     /// Index of its first Gaussian.
     start: usize,
-    gradient: Part<'o>,
+    /// Number of its Gaussians.
+    length: usize,
+    /// Where the avatar's part goes, if it is asked for.
+    gradient: Option<Part<'o>>,
+    /// What is asked of the body, if anyone wants to know.
+    of_body: Option<OfBody>,
     /// R of each Gaussian, for the SH; empty if they stay.
     relative: Vec<Quaternion<f32>>,
     /// By how much each Gaussian grows; empty unless joints scale and offsets follow.
@@ -123,22 +166,28 @@ struct AdjointChunk<'f, 'a, 'o> {
 
 impl AdjointChunk<'_, '_, '_> {
     /// As forwards: blocks by joints, then what streams through memory.
-    fn run(mut self) {
+    fn run(mut self) -> Option<OfBody> {
         let frame = self.frame;
-        if self.rotates_sh() {
-            self.relative.resize(self.gradient.means.len(), [0.0; 4]);
+        if self.rotates_sh() && self.gradient.is_some() {
+            self.relative.resize(self.length, [0.0; 4]);
         }
         if frame.offsets_grow() {
-            self.growth.resize(self.gradient.means.len(), 1.0);
+            self.growth.resize(self.length, 1.0);
         }
         if frame.tangents.is_some() && frame.bound.moves == Moves::WithFaces {
-            self.rest_means.resize(self.gradient.means.len(), Vec3::ZERO);
+            self.rest_means.resize(self.length, Vec3::ZERO);
         }
         let chunk = &frame.bound.chunks(frame.strategy.covariance)[self.number];
         frame.walk(chunk, self.start, &mut self);
-        self.embeddings();
-        self.opacities();
-        self.sh();
+        if let Some(mut gradient) = self.gradient.take() {
+            self.embeddings(&mut gradient);
+            self.opacities(&mut gradient);
+            self.sh(&mut gradient);
+        }
+        if let Some(of_body) = &mut self.of_body {
+            of_body.growth = self.growth;
+        }
+        self.of_body
     }
 
     fn rotates_sh(&self) -> bool {
@@ -147,11 +196,11 @@ impl AdjointChunk<'_, '_, '_> {
 
     /// Barycentric coordinates and offsets, through the point on the posed mesh, or on the rest mesh where the face
     /// carries that along.
-    fn embeddings(&mut self) {
+    fn embeddings(&self, gradient: &mut Part<'_>) {
         let Frame { bound, body, .. } = self.frame;
         let (Moves::WithFaces, Some(surface)) = (bound.moves, &bound.surface) else { return };
         let mesh = body.mesh();
-        let places = self.gradient.barycentric.iter_mut().zip(self.gradient.offsets.iter_mut());
+        let places = gradient.barycentric.iter_mut().zip(gradient.offsets.iter_mut());
         for (i, (barycentric, offset)) in places.enumerate() {
             let gaussian = self.start + i;
             let (embedding, of_mean) = (&surface.embeddings[gaussian], self.upstream.means[gaussian]);
@@ -173,24 +222,53 @@ impl AdjointChunk<'_, '_, '_> {
     }
 
     /// The sigmoid: o (1 − o).
-    fn opacities(&mut self) {
-        let range = self.start..self.start + self.gradient.opacity_logits.len();
+    fn opacities(&self, gradient: &mut Part<'_>) {
+        let range = self.start..self.start + self.length;
         let opacities = self.frame.bound.opacities[range.clone()].iter().zip(&self.upstream.opacities[range]);
-        for (sum, (&opacity, &own)) in self.gradient.opacity_logits.iter_mut().zip(opacities) {
+        for (sum, (&opacity, &own)) in gradient.opacity_logits.iter_mut().zip(opacities) {
             *sum += own * (opacity * (1.0 - opacity));
         }
     }
 
-    fn sh(&mut self) {
+    fn sh(&self, gradient: &mut Part<'_>) {
         let (degree, count) = (self.frame.bound.sh_degree, self.frame.bound.sh_count());
-        let upstream = &self.upstream.sh[self.start * count..][..self.gradient.sh.len()];
+        let upstream = &self.upstream.sh[self.start * count..][..gradient.sh.len()];
         if self.relative.is_empty() {
-            return colour::add_sh(upstream, self.gradient.sh);
+            return colour::add_sh(upstream, gradient.sh);
         }
-        let values = upstream.chunks_exact(count).zip(self.gradient.sh.chunks_exact_mut(count));
+        let values = upstream.chunks_exact(count).zip(gradient.sh.chunks_exact_mut(count));
         for (quat, (upstream, gradient)) in self.relative.iter().zip(values) {
             colour::rotate_sh_adjoint(*quat, degree, upstream, gradient);
         }
+    }
+
+    /// What a block asks of its Gaussians.
+    #[inline(always)]
+    fn back_to_avatar(
+        &mut self,
+        position: usize,
+        input: &BlockInput<'_>,
+        rotated: &Rotated,
+        scales: &[Lanes; 3],
+        of_factors: &[Lanes; 9],
+        of_covariance: &CovarianceGradient,
+    ) {
+        let (block, choice) = (input.block, self.frame.strategy.covariance);
+        let mut log_scales = of_covariance.log_scales;
+        let mut rotations = self.of_rotations(input, rotated, &of_covariance.rotation);
+        let mut units = &block.rotations;
+        if choice == CovarianceChoice::Surfel {
+            self.through_discs(position, input, &mut rotations, &mut log_scales);
+            let own = &self.frame.bound.chunks(CovarianceChoice::Rotate)[self.number];
+            units = &own.blocks[position].rotations;
+        }
+        let stored = self.of_stored(input, units, &rotations);
+        let mut means = self.of_means(input, rotated);
+        if input.jacobian.is_some() {
+            let of_drawn = (of_factors, &of_covariance.rotation);
+            self.through_jacobian(position, input, rotated, scales, of_drawn, &mut means);
+        }
+        self.add(block, &means, &stored, &log_scales);
     }
 
     /// The derivatives with respect to the factors of a block, row-major.
@@ -325,12 +403,15 @@ impl AdjointChunk<'_, '_, '_> {
                     matrix3::add_scaled(of_mean, 1.0, of_block.adjoint(jacobian, across, lane, upstream));
             };
             if let Some(across) = covariance.across() {
-                add(across, &covariance::map_adjoint(&input.block.rotations, scales, of_factors, lane));
+                add(
+                    across,
+                    &covariance::map_adjoint(covariance, &input.block.rotations, scales, of_factors, lane),
+                );
             }
             if let Some(across) = source {
                 let own = torque.as_ref().map_or([0.0; 3], |t| [0, 1, 2].map(|axis: usize| t[axis][lane]));
                 let posed = if turns {
-                    torque_of(take(&rotated.posed, lane), take(of_posed, lane))
+                    rotation::adjoint::to_torque(take(&rotated.posed, lane), take(of_posed, lane))
                 } else {
                     [0.0; 3]
                 };
@@ -370,12 +451,13 @@ impl AdjointChunk<'_, '_, '_> {
 
     #[inline(always)]
     fn add(&mut self, block: &Block, means: &[Lanes; 3], rotations: &[Lanes; 4], log_scales: &[Lanes; 3]) {
+        let Some(gradient) = &mut self.gradient else { return };
         for lane in 0..block.count {
             let i = usize::from(block.index[lane]);
-            self.gradient.means[i] += Vec3::new(means[0][lane], means[1][lane], means[2][lane]);
+            gradient.means[i] += Vec3::new(means[0][lane], means[1][lane], means[2][lane]);
             let own = take(rotations, lane);
-            self.gradient.rotations[i].iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
-            self.gradient.log_scales[i] +=
+            gradient.rotations[i].iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+            gradient.log_scales[i] +=
                 Vec3::new(log_scales[0][lane], log_scales[1][lane], log_scales[2][lane]);
         }
     }
@@ -397,15 +479,6 @@ impl AdjointChunk<'_, '_, '_> {
     }
 }
 
-/// The derivative with respect to a further rotation of the world, from that with respect to a quaternion it turns.
-fn torque_of(q: Quaternion<f32>, gradient: Quaternion<f32>) -> [f32; 3] {
-    [0, 1, 2].map(|axis: usize| {
-        let mut turn = [0.0; 4];
-        turn[axis + 1] = 0.5;
-        dot4(rotation::multiply(turn, q), gradient)
-    })
-}
-
 impl Visitor for AdjointChunk<'_, '_, '_> {
     #[inline(always)]
     fn block(&mut self, position: usize, input: &BlockInput<'_>, rotated: &Rotated, scales: &[Lanes; 3]) {
@@ -414,21 +487,24 @@ impl Visitor for AdjointChunk<'_, '_, '_> {
         let map = covariance::deforming(choice, input);
         let of_covariance =
             covariance::adjoint(choice, &rotated.posed, map, &block.rotations, scales, &of_factors);
-        let mut log_scales = of_covariance.log_scales;
-        let mut rotations = self.of_rotations(input, rotated, &of_covariance.rotation);
-        let mut units = &block.rotations;
-        if choice == CovarianceChoice::Surfel {
-            self.through_discs(position, input, &mut rotations, &mut log_scales);
-            let own = &self.frame.bound.chunks(CovarianceChoice::Rotate)[self.number];
-            units = &own.blocks[position].rotations;
+        if let Some(of_body) = &mut self.of_body {
+            let (frame, upstream, number) = (self.frame, self.upstream, self.number);
+            let (of_factors, of_covariance) = (&of_factors, &of_covariance);
+            of_body.add(&body_adjoint::Block {
+                frame,
+                upstream,
+                number,
+                position,
+                input,
+                rotated,
+                scales,
+                of_factors,
+                of_covariance,
+            });
         }
-        let stored = self.of_stored(input, units, &rotations);
-        let mut means = self.of_means(input, rotated);
-        if input.jacobian.is_some() {
-            let of_drawn = (&of_factors, &of_covariance.rotation);
-            self.through_jacobian(position, input, rotated, scales, of_drawn, &mut means);
+        if self.gradient.is_some() {
+            self.back_to_avatar(position, input, rotated, scales, &of_factors, &of_covariance);
         }
-        self.add(block, &means, &stored, &log_scales);
         if let (false, Some(growth)) = (self.growth.is_empty(), input.growth()) {
             for lane in 0..block.count {
                 self.growth[usize::from(block.index[lane])] = growth[lane];

@@ -33,6 +33,27 @@ pub(super) fn view_frame(
     Mat3::from_cols_array_2d(&matrix3::transpose(frame))
 }
 
+/// The derivative with respect to B of one lane, from that with respect to its [`view_frame`]. Lengths of directions do not count,
+/// so the derivative is taken to have no part that scales the frame. Zero where another frame takes the place of a singular one,
+/// and under choices that do not read B.
+pub(super) fn blend_adjoint(choice: ColourChoice, b: Matrix3<f32>, of_frame: &Matrix3<f32>) -> Matrix3<f32> {
+    let zero = [[0.0; 3]; 3];
+    match choice {
+        ColourChoice::None | ColourChoice::RotateSh | ColourChoice::ViewRotation => zero,
+        ColourChoice::ViewBlend if largest(b) > SINGULAR => matrix3::transpose(*of_frame),
+        ColourChoice::ViewBlend => zero,
+        ColourChoice::ViewBlendInverse => {
+            let Some(frame) = inverse_direction(b) else { return zero };
+            let product = matrix3::multiply(frame, b);
+            let multiple = (product[0][0] + product[1][1] + product[2][2]) / 3.0;
+            // F = c B⁻¹: δF = −F δB F / c.
+            let back = matrix3::transpose(frame);
+            let of_blend = matrix3::multiply(matrix3::multiply(back, *of_frame), back);
+            of_blend.map(|row| row.map(|entry| -entry / multiple))
+        }
+    }
+}
+
 fn largest(m: Matrix3<f32>) -> f32 {
     m.as_flattened().iter().fold(0.0, |largest: f32, entry| largest.max(entry.abs()))
 }

@@ -94,12 +94,15 @@ pub(super) fn adjoint(
 
 /// The derivative with respect to the deforming map of one lane, G (R_c S)ᵀ, from that with respect to M.
 pub(super) fn map_adjoint(
+    choice: CovarianceChoice,
     canonical: &[Lanes; 4],
     scales: &[Lanes; 3],
     gradient: &[Lanes; 9],
     lane: usize,
 ) -> Matrix3<f32> {
-    let own = rotation::quaternion_to_matrix_raw(take(canonical, lane));
+    let [w, x, y, z] = take(canonical, lane);
+    let sign = if choice == CovarianceChoice::AffineConjugate { -1.0 } else { 1.0 };
+    let own = rotation::quaternion_to_matrix_raw([w, sign * x, sign * y, sign * z]);
     let shape = scaled(&own, scales, lane);
     product(&lanes::matrix(gradient, lane), &matrix3::transpose(shape))
 }

@@ -144,6 +144,18 @@ impl FaceMotion {
         self.to + self.rotation * (point - self.from) * self.growth
     }
 
+    /// The derivatives with respect to a further rotation and to the growth; that with respect to the posed centroid is the
+    /// gradient itself.
+    pub(super) fn motion_adjoint(&self, point: Vec3, gradient: Vec3) -> (Vec3, f32) {
+        let turned = self.rotation * (point - self.from);
+        ((turned * self.growth).cross(gradient), turned.dot(gradient))
+    }
+
+    /// By how much a Gaussian grows.
+    pub(super) fn growth(&self) -> f32 {
+        self.growth
+    }
+
     /// The derivative with respect to the point.
     pub(super) fn adjoint(&self, gradient: Vec3) -> Vec3 {
         self.rotation.conjugate() * gradient * self.growth

@@ -4,6 +4,7 @@
 mod adjoint;
 mod bake;
 mod blend;
+mod body_adjoint;
 mod bound;
 mod colour;
 mod covariance;
@@ -35,7 +36,7 @@ pub use bound::BoundAvatar;
 pub use error::PosingError;
 pub use face_frame::FaceFrame;
 pub use lift::JointLift;
-pub use options::PoseOptions;
+pub use options::{Gradients, PoseOptions};
 pub use poser::{Poser, pose};
 pub use presets::{PRESETS, Preset};
 pub use push_forward::Across;

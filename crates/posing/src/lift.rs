@@ -28,6 +28,15 @@ impl JointLift {
         Self::near(body, |_| rotation::identity())
     }
 
+    /// Each joint with w of 0 or more, whatever its parent's sign: what sums without alignment blend. Signs do not belong
+    /// together where joints are turned by more than 180° against each other.
+    pub(crate) fn with_positive_w(body: &PosedBody<'_>) -> Self {
+        let of = |q: glam::DQuat| [q.w, q.x, q.y, q.z];
+        let positive = |q: Quaternion<f64>| rotation::SignPolicy::NonNegativeW.apply(q, q);
+        let own: Vec<_> = body.joints.iter().map(|joint| positive(of(joint.rotation))).collect();
+        Self { relative: own.clone(), lifted: own }
+    }
+
     /// The frame after `previous`, or the first one.
     pub fn next(previous: Option<&Self>, body: &PosedBody<'_>) -> Self {
         previous.map_or_else(|| Self::from_rest(body), |previous| previous.following(body))

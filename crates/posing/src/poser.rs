@@ -6,13 +6,13 @@ use super::covariance::{self, factors};
 use super::frame::{Frame, Visitor};
 use super::lanes::{Lanes, take};
 use super::layout::CHUNK;
-use super::options::PoseOptions;
+use super::options::{Gradients, PoseOptions};
 use super::rotate::{BlockInput, Rotated};
 use super::{BoundAvatar, ColourChoice, CovarianceChoice, PosingError, Strategy, colour};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use skinsplat_core::math::{Quaternion, rotation};
-use skinsplat_core::scene::{AvatarGradient, Gaussians, OwnedPosed, Posed, PosedBody, PosedGradient};
+use skinsplat_core::scene::{Gaussians, OwnedPosed, Posed, PosedBody, PosedGradient};
 
 /// Poses avatars, and owns the memory of the last pose: at 100,000 Gaussians fresh memory costs as much as the work.
 #[derive(Debug)]
@@ -82,23 +82,27 @@ impl Poser {
         })
     }
 
-    /// Adds to `gradient` what a pose contributes, so that the frames of a batch sum in the order of the calls: the
+    /// Adds to the gradients what a pose contributes, so that the frames of a batch sum in the order of the calls: the
     /// transposed derivative of [`Self::pose`] applied to `upstream`. `gaussians` are those that `bound` was made of or
-    /// last updated with; `gradient` is one that [`AvatarGradient::reset`] made for them. A camera in the options changes
-    /// nothing: what it does not see has no derivatives.
+    /// last updated with, read only if the avatar's gradient is asked for; `into` is an [`AvatarGradient`](skinsplat_core::scene::AvatarGradient) that [`reset`](skinsplat_core::scene::AvatarGradient::reset) made for them, or [`Gradients`]. A
+    /// camera in the options changes nothing: what it does not see has no derivatives.
     ///
     /// Exact for every strategy, piecewise where a strategy chooses (the branch of a matrix-to-quaternion conversion, the
-    /// thin axis of a disc). Two dependencies are left out, as the stock methods leave them out or because
-    /// [`PosedGradient`] has no place for them:
+    /// thin axis of a disc, the side that a quaternion is brought to). Dependencies that are left out, as the stock methods
+    /// leave them out:
     /// * barycentric coordinates move the position only, neither the skinning weights mixed with them nor a vertex average;
-    /// * frames in which view directions are read do not follow parameters (only those of a conversion of B R_c could).
+    /// * frames in which view directions are read do not follow parameters of the avatar (only those of a conversion of B R_c
+    ///   could); they do follow the body;
+    /// * the body is not followed through rotations that were given, nor where a strategy falls back on another because what
+    ///   it reads is degenerate (a face without area, a tie of the average, a blend that vanishes); how large joints are is a
+    ///   constant.
     ///
     /// The result is the same, bit for bit, for any number of threads and any width of vector instructions.
     ///
     /// # Errors
-    /// Those of [`Self::pose`], and [`PosingError::Scene`] for arrays whose length does not fit the bound avatar. Nothing
-    /// was added then.
-    pub fn backward(
+    /// Those of [`Self::pose`], and [`PosingError::Scene`] for arrays whose length does not fit the bound avatar or the body.
+    /// Nothing was added then.
+    pub fn backward<'g>(
         &mut self,
         bound: &BoundAvatar,
         body: &PosedBody<'_>,
@@ -106,11 +110,11 @@ impl Poser {
         options: &PoseOptions<'_>,
         gaussians: &Gaussians,
         upstream: &PosedGradient,
-        gradient: &mut AvatarGradient,
+        into: impl Into<Gradients<'g>>,
     ) -> Result<(), PosingError> {
         let options = PoseOptions { seen_by: None, ..*options };
         let frame = Frame::new(self.arch, bound, body, strategy, &options)?;
-        adjoint::add(&frame, gaussians, upstream, gradient)
+        adjoint::add(&frame, gaussians, upstream, into.into())
     }
 
     /// The memory, with an entry of any value for everything that is produced.
@@ -320,7 +324,7 @@ mod tests {
     use super::super::PRESETS;
     use super::*;
     use glam::DVec3;
-    use skinsplat_core::scene::{Avatar, Binding, Pose, RestBody, Skeleton, SkinWeights};
+    use skinsplat_core::scene::{Avatar, AvatarGradient, Binding, Pose, RestBody, Skeleton, SkinWeights};
 
     /// A fan of triangles over a chain of six joints, and a Gaussian per vertex that hangs on one to six of them.
     fn fan() -> (RestBody, Avatar) {

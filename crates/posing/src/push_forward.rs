@@ -261,14 +261,7 @@ impl<'a> Derivative<'a> {
         lane: usize,
         upstream: &Matrix3<f32>,
     ) -> [f32; 3] {
-        let upstream = match across {
-            Across::Normal if jacobian.normal.is_some() => {
-                let normal = [0, 1, 2].map(|k: usize| self.tangents.normals[self.position][k][lane]);
-                let constant = lanes::matrix(&jacobian.constant, lane);
-                with_normal_adjoint(&constant, normal, self.growth()[lane], upstream)
-            }
-            _ => *upstream,
-        };
+        let upstream = self.constant_adjoint(jacobian, across, lane, upstream);
         let b = self.blend.matrix(lane);
         let mut of_mean = [0.0; 3];
         for (joint, gradient) in self.influences() {
@@ -281,6 +274,51 @@ impl<'a> Derivative<'a> {
             }
         }
         of_mean
+    }
+
+    /// From the derivative with respect to J with its normal carried to that with respect to J itself, which is also the one
+    /// with respect to the blend B in it.
+    fn constant_adjoint(
+        self,
+        jacobian: &Jacobian,
+        across: Across,
+        lane: usize,
+        upstream: &Matrix3<f32>,
+    ) -> Matrix3<f32> {
+        match across {
+            Across::Normal if jacobian.normal.is_some() => {
+                let normal = [0, 1, 2].map(|k: usize| self.tangents.normals[self.position][k][lane]);
+                let constant = lanes::matrix(&jacobian.constant, lane);
+                with_normal_adjoint(&constant, normal, self.growth()[lane], upstream)
+            }
+            _ => *upstream,
+        }
+    }
+
+    /// The derivatives with respect to the motions of the joints, from that with respect to J (or to it with its normal
+    /// carried) of a lane: with respect to B is returned, `add` gets each influence and what its motion L_j x + t_j of the
+    /// Gaussian is asked for.
+    pub(super) fn joint_adjoint(
+        self,
+        jacobian: &Jacobian,
+        across: Across,
+        lane: usize,
+        upstream: &Matrix3<f32>,
+        mut add: impl FnMut(usize, [f32; 3]),
+    ) -> Matrix3<f32> {
+        let of_blend = self.constant_adjoint(jacobian, across, lane, upstream);
+        let (_, weights) = self.chunk.influences(&self.chunk.blocks[self.position]);
+        let along =
+            |gradient: &[Lanes; 3]| matrix3::apply(of_blend, [0, 1, 2].map(|k: usize| gradient[k][lane]));
+        // Motions count less φ(x) = Σ w_j m_j.
+        let mut total = [0.0; 3];
+        for (_, gradient) in self.influences() {
+            total = matrix3::add_scaled(total, 1.0, along(gradient));
+        }
+        for (influence, ((_, gradient), weight)) in self.influences().zip(weights).enumerate() {
+            add(influence, matrix3::add_scaled(along(gradient), -weight[lane], total));
+        }
+        of_blend
     }
 }
 

@@ -46,6 +46,20 @@ impl Embedding {
         ([coordinate(0), coordinate(1), coordinate(2)], along)
     }
 
+    /// The derivatives with respect to the corners and to their normals, from that with respect to the point.
+    pub(crate) fn mesh_adjoint(&self, mesh: &PosedMesh, gradient: Vec3) -> [(Vec3, Vec3); 3] {
+        let normals = self.corners.map(|v| mesh.normals[v as usize]);
+        let [a, b, c] = self.barycentric;
+        let sum = normals[0] * a + normals[1] * b + normals[2] * c;
+        let unit = sum.normalize_or_zero();
+        let of_sum = if unit == Vec3::ZERO || self.offset == 0.0 {
+            Vec3::ZERO
+        } else {
+            (gradient - unit * unit.dot(gradient)) * (self.offset / unit.dot(sum))
+        };
+        self.barycentric.map(|share| (gradient * share, of_sum * share))
+    }
+
     /// With an offset that has grown with the joints. A factor of 1 changes no bit.
     pub(crate) fn grown(&self, growth: f32) -> Self {
         Self { offset: self.offset * growth, ..*self }

@@ -2,6 +2,7 @@
 
 pub mod avatar;
 pub mod body;
+mod body_adjoint;
 pub mod camera;
 pub mod gradient;
 pub mod hands;
@@ -16,7 +17,7 @@ pub mod skin_weights;
 pub use avatar::{Avatar, Binding, FaceBinding, Gaussians};
 pub use body::{Body, RestBody, ShapeSpace, Uv};
 pub use camera::Camera;
-pub use gradient::{AvatarGradient, PosedGradient, RenderedGradient};
+pub use gradient::{AvatarGradient, BodyGradient, PoseGradient, PosedGradient, RenderedGradient};
 pub use hands::{HandSpace, HandSpaces};
 pub use image::{Image, Mask};
 pub use pose::Pose;

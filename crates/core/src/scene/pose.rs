@@ -31,4 +31,21 @@ impl Pose {
         }
         Self { locals, translation, blend_shape_rotations: Some(rotations) }
     }
+
+    /// The pose with a further rotation of every node, `exp(ω) R` about the axes of its parent (ω is axis times angle,
+    /// radians), and moved by a translation, metres. What drives blend shapes turns along. Vectors beyond the nodes are left
+    /// out, as nodes beyond the vectors stay.
+    #[must_use]
+    pub fn turned(&self, rotations: &[DVec3], translation: DVec3) -> Self {
+        let mut turned = self.clone();
+        turned.translation += translation;
+        for (node, &vector) in rotations.iter().enumerate().filter(|(_, vector)| **vector != DVec3::ZERO) {
+            let further = portable::from_scaled_axis(vector);
+            let turn = |rotation: &mut DQuat| *rotation = (further * *rotation).normalize();
+            turned.locals.get_mut(node).map(|local| &mut local.rotation).into_iter().for_each(turn);
+            let shapes = turned.blend_shape_rotations.as_mut();
+            shapes.and_then(|rotations| rotations.get_mut(node)).into_iter().for_each(turn);
+        }
+        turned
+    }
 }

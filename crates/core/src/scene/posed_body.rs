@@ -25,7 +25,7 @@ pub struct PosedBody<'a> {
     pub rest: &'a RestBody,
     /// One per deforming joint, [`Pose::translation`] included.
     pub joints: Vec<JointTransform>,
-    blend_shape_rotations: Option<Vec<DQuat>>,
+    pub(super) blend_shape_rotations: Option<Vec<DQuat>>,
     mesh: OnceLock<PosedMesh>,
 }
 
@@ -118,7 +118,8 @@ impl<'a> PosedBody<'a> {
         joints.iter().zip(weights).map(moved).sum()
     }
 
-    fn posed_rest_vertices(&self) -> std::borrow::Cow<'_, [DVec3]> {
+    /// The vertices before skinning, with the shapes that the pose drives.
+    pub(super) fn posed_rest_vertices(&self) -> std::borrow::Cow<'_, [DVec3]> {
         let Some(rotations) =
             self.blend_shape_rotations.as_ref().filter(|_| !self.rest.pose_directions.is_empty())
         else {

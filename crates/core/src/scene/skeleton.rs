@@ -40,7 +40,8 @@ pub struct Skeleton {
     pub inverse_binds: Vec<DAffine3>,
     /// How hand poses are read, of models that say so.
     pub hands: Option<Arc<HandSpaces>>,
-    order: Vec<usize>,
+    /// Parents before children.
+    pub(super) order: Vec<usize>,
 }
 
 impl Skeleton {

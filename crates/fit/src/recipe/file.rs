@@ -58,6 +58,11 @@ pub(super) fn parse(specification: &str) -> Result<Recipe, Error> {
     let base = RECIPES.iter().find(|recipe| recipe.id == id);
     let base = base.ok_or_else(|| refuse(format!("no recipe `{id}`"), format!("one of {}", known())))?;
     let mut table = Table::try_from(base).map_err(|e| refuse(e.to_string(), "a recipe".into()))?;
+    // What recipes leave out where nothing is special about it can be varied all the same.
+    let complete =
+        |value: Result<Value, toml::ser::Error>| value.map_err(|e| refuse(e.to_string(), "a recipe".into()));
+    table.entry("poses").or_insert(complete(Value::try_from(base.poses))?);
+    table.entry("pose").or_insert(complete(Value::try_from(&base.pose))?);
     let mut varied = false;
     for part in parts {
         let expected = || "FIELD=VALUE with a field of recipes.toml, such as rates.rotation=0.01".to_owned();
@@ -126,6 +131,10 @@ mod tests {
         assert_eq!(recipe.rates.rotation, 0.5);
         assert_eq!(recipe.free.rotation, super::super::FreeRotation::Fixed);
         assert_eq!(recipe.sh_degree, 1);
+        let refined = parse("pure-skinned+poses=refine+pose.rate=0.25").expect("varied");
+        assert_eq!((refined.poses, refined.pose.rate), (super::super::Poses::Refine, 0.25));
+        // Recipes that do not ask for it keep their content keys.
+        assert!(!Table::try_from(&recipe).expect("a recipe").contains_key("pose"));
         let quoted = parse("pure-skinned+strategy=\"quaternion-average+colour=none\"").expect("varied");
         assert_eq!(quoted.strategy, "quaternion-average+colour=none");
         assert_eq!(recipe.id, "pure-skinned+rates.rotation=0.5+free.rotation=fixed+sh_degree=1");
@@ -151,6 +160,9 @@ mod tests {
             "hugs-skinned+free.rotation=about-normal",
             "haha+mesh.texture=0",
             "haha+mesh.rate=-1.0",
+            "haha+poses=guess",
+            "haha+poses=refine+pose.decay=0.0",
+            "haha+poses=refine+pose.most_degrees=200.0",
             "pure-skinned+strategy=\"lbs",
         ] {
             assert!(parse(wrong).is_err(), "{wrong}");

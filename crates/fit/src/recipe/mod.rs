@@ -9,7 +9,9 @@ mod file;
 pub use file::RECIPES;
 
 use crate::Error;
-use crate::options::{Clothing, Cover, Moments, NOT_NEGATIVE, POSITIVE, Schedule, Sighting, within};
+use crate::options::{
+    Clothing, Cover, Moments, NOT_NEGATIVE, POSITIVE, PoseRefinement, Schedule, Sighting, within,
+};
 use crate::shape::ShapeOptions;
 use serde::{Deserialize, Serialize};
 
@@ -49,6 +51,12 @@ pub struct Recipe {
     /// A textured mesh that is drawn with the Gaussians; none if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<MeshLayer>,
+    /// Whether the poses of training frames are fitted too.
+    #[serde(default, skip_serializing_if = "Poses::are_given")]
+    pub poses: Poses,
+    /// How, where they are.
+    #[serde(default, skip_serializing_if = "PoseRefinement::is_default")]
+    pub pose: PoseRefinement,
     /// How the body's outline is brought onto those of the masks.
     #[serde(default)]
     pub clothing: Clothing,
@@ -86,6 +94,25 @@ impl FitOptions {
     pub fn shape_iterations(&self) -> u32 {
         let Schedule { shape_share, most_shape_iterations, .. } = self.recipe.schedule;
         ((f64::from(self.iterations) * shape_share) as u32).clamp(1, most_shape_iterations.max(1))
+    }
+}
+
+/// What becomes of the poses of training frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Poses {
+    /// They stay as they are given.
+    #[default]
+    Given,
+    /// They are fitted with the avatar ([`PoseRefinement`]), as HUGS, HAHA and InstantAvatar do. The avatar's start is made with
+    /// those given, and the mesh of a hybrid asks nothing of them.
+    Refine,
+}
+
+impl Poses {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    fn are_given(&self) -> bool {
+        *self == Self::Given
     }
 }
 
@@ -459,6 +486,7 @@ impl Recipe {
             }
             mesh.moments.check("mesh.moments")?;
         }
+        self.pose.check("pose")?;
         self.clothing.check("clothing")?;
         self.sighting.check("sighting")?;
         self.cover.check("cover")?;

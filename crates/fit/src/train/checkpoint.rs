@@ -3,6 +3,7 @@
 use super::density::Density;
 use super::layer::State;
 use super::parameters::Parameters;
+use super::poses::TrainingPoses;
 use crate::Error;
 use crate::recipe::FitOptions;
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,8 @@ pub struct Checkpoint {
     pub(super) density: Density,
     /// Of the mesh that is drawn with the Gaussians.
     pub(super) layer: Option<State>,
+    /// Of the poses, where they are fitted.
+    pub(super) poses: Option<TrainingPoses>,
 }
 
 impl Checkpoint {
@@ -28,9 +31,10 @@ impl Checkpoint {
         parameters: Parameters,
         density: Density,
         layer: Option<State>,
+        poses: Option<TrainingPoses>,
         iteration: u32,
     ) -> Self {
-        Self { key, iteration, parameters, density, layer }
+        Self { key, iteration, parameters, density, layer, poses }
     }
 
     /// Iterations done.

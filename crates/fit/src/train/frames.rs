@@ -13,6 +13,8 @@ pub(super) struct TrainingFrame<'f> {
     pub(super) name: &'f str,
     pub(super) camera: &'f Camera,
     pub(super) pose: &'f Pose,
+    /// Which of the sequence's poses it is.
+    pub(super) pose_index: usize,
     pub(super) truth: &'f Truth,
 }
 
@@ -79,6 +81,7 @@ impl<'a> TrainingFrames<'a> {
             name: &frame.name,
             camera: &self.sequence.cameras[frame.camera],
             pose: &self.sequence.poses[frame.pose],
+            pose_index: frame.pose,
             truth,
         })
     }

@@ -10,10 +10,12 @@ mod density;
 mod frames;
 mod layer;
 mod parameters;
+mod poses;
 mod regularise;
 mod walk;
 
 pub use checkpoint::Checkpoint;
+pub use poses::RefinedPose;
 
 use super::Error;
 use super::loss::{FrameLoss, Losses, Weights};
@@ -21,21 +23,22 @@ use super::shape::{Ended, ShapeFit, fit_shape};
 use super::surface::{SurfaceInit, surface_init};
 use super::texture::TexturedBody;
 use crate::options::Clothing;
-use crate::recipe::{FitBackground, FitOptions, Recipe, Surface};
+use crate::recipe::{FitBackground, FitOptions, Poses, Recipe, Surface};
 use density::Density;
 use frames::TrainingFrames;
 use layer::Layer;
 use parameters::{Parameters, RatesNow};
+use poses::TrainingPoses;
 use serde::{Deserialize, Serialize};
 use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::scene::{
-    Avatar, AvatarGradient, Binding, Image, Mask, PosedBody, PosedGradient, Rendered, RenderedGradient,
-    RestBody,
+    Avatar, AvatarGradient, Binding, BodyGradient, Image, Mask, PosedBody, PosedGradient, Rendered,
+    RenderedGradient, RestBody,
 };
 use skinsplat_data::sequence::Sequence;
 use skinsplat_posing::nearest::NearestFace;
-use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
+use skinsplat_posing::{BoundAvatar, Gradients, PoseOptions, Poser, Strategy};
 use skinsplat_render::View;
 use skinsplat_render::mesh::Drawing;
 use skinsplat_render::splat::{Derivatives, Renderer};
@@ -79,6 +82,8 @@ pub struct Trainer<'a> {
     parameters: Parameters,
     density: Density,
     layer: Option<Layer>,
+    /// Where they are fitted too.
+    poses: Option<TrainingPoses>,
     iteration: u32,
     bound: BoundAvatar,
     /// Of the body, for Gaussians that look for the face nearest to them.
@@ -108,6 +113,7 @@ struct Scratch {
     of_rendered: RenderedGradient,
     of_posed: PosedGradient,
     of_avatar: AvatarGradient,
+    of_body: BodyGradient,
 }
 
 /// All that the avatar with which a fit starts depends on, but the frames: what a content key of it must hold.
@@ -195,7 +201,8 @@ impl<'a> Trainer<'a> {
             .as_ref()
             .map(|mesh| Layer::new(sequence, &options.recipe, mesh))
             .transpose()?;
-        Self::with_state(sequence, options, (parameters, density, layer), 0)
+        let poses = (options.recipe.poses == Poses::Refine).then(TrainingPoses::default);
+        Self::with_state(sequence, options, (parameters, density, layer, poses), 0)
     }
 
     /// Goes on from a checkpoint of the same sequence and options.
@@ -208,19 +215,19 @@ impl<'a> Trainer<'a> {
         checkpoint: Checkpoint,
     ) -> Result<Self, Error> {
         let key = checkpoint::key(sequence, options)?;
-        let Checkpoint { parameters, density, layer, iteration, .. } = checkpoint.matching(&key)?;
+        let Checkpoint { parameters, density, layer, poses, iteration, .. } = checkpoint.matching(&key)?;
         let layer = match (&options.recipe.mesh, layer) {
             (Some(mesh), Some(state)) => Some(Layer::resume(sequence, mesh, state)?),
             _ => None,
         };
-        let trainer = Self::with_state(sequence, options, (parameters, density, layer), iteration)?;
+        let trainer = Self::with_state(sequence, options, (parameters, density, layer, poses), iteration)?;
         Ok(Self { key: OnceLock::from(key), ..trainer })
     }
 
     fn with_state(
         sequence: &'a Sequence,
         options: &'a FitOptions,
-        (parameters, density, layer): (Parameters, Density, Option<Layer>),
+        (parameters, density, layer, poses): (Parameters, Density, Option<Layer>, Option<TrainingPoses>),
         iteration: u32,
     ) -> Result<Self, Error> {
         options
@@ -241,6 +248,7 @@ impl<'a> Trainer<'a> {
             parameters,
             density,
             layer,
+            poses,
             iteration,
             bound,
             faces: NearestFace::new(&sequence.body),
@@ -272,6 +280,11 @@ impl<'a> Trainer<'a> {
         Fitted { avatar: self.avatar(), mesh: self.layer.as_ref().map(|layer| &layer.textured) }
     }
 
+    /// The poses of the training frames as they stand, if they are fitted, in the order of the sequence's poses.
+    pub fn poses(&self) -> Option<Vec<RefinedPose>> {
+        self.poses.as_ref().map(|poses| poses.refined(self.sequence))
+    }
+
     /// Warnings since they were last taken.
     pub fn take_warnings(&mut self) -> Vec<String> {
         std::mem::take(&mut self.warnings)
@@ -291,7 +304,9 @@ impl<'a> Trainer<'a> {
             }
         };
         let layer = self.layer.as_ref().map(Layer::state);
-        Ok(Checkpoint::new(key, self.parameters.clone(), self.density.clone(), layer, self.iteration))
+        let (parameters, density, poses) =
+            (self.parameters.clone(), self.density.clone(), self.poses.clone());
+        Ok(Checkpoint::new(key, parameters, density, layer, poses, self.iteration))
     }
 
     /// One iteration.
@@ -309,13 +324,16 @@ impl<'a> Trainer<'a> {
             self.bound.update(&self.parameters.avatar).map_err(&in_strategy)?;
         }
         let frame = self.frames.of_iteration(self.iteration as usize, &mut self.warnings)?;
-        let body = PosedBody::new(&self.sequence.body, frame.pose).map_err(Error::scene(self.sequence))?;
+        let refined = self.poses.as_ref().map(|poses| poses.applied(frame.pose_index, frame.pose));
+        let pose = refined.as_ref().unwrap_or(frame.pose);
+        let body = PosedBody::new(&self.sequence.body, pose).map_err(Error::scene(self.sequence))?;
         let (strategy, posing) = (&self.strategy, PoseOptions::default());
-        let Scratch { poser, renderer, truth, losses, of_rendered, of_posed, of_avatar } = &mut self.scratch;
+        let Scratch { poser, renderer, truth, losses, of_rendered, of_posed, of_avatar, of_body } =
+            &mut self.scratch;
         let posed = poser.pose(&self.bound, &body, strategy, &posing).map_err(&in_strategy)?;
         let background = background(recipe.background, self.options.seed, self.iteration);
         let in_scene = Error::scene(self.sequence);
-        let drawing = self.layer.as_ref().map(|layer| layer.draw(frame.pose, frame.camera));
+        let drawing = self.layer.as_ref().map(|layer| layer.draw(pose, frame.camera));
         let drawing = drawing.transpose().map_err(&in_scene)?;
         let underlay = drawing.as_ref().map(Drawing::underlay);
         let view = View::new(frame.camera).over(background).with_underlay(underlay);
@@ -325,14 +343,27 @@ impl<'a> Trainer<'a> {
         let loss = losses.frame((image, alpha), (truth, &frame.truth.alpha), &weights, of_rendered);
         renderer.backward(&posed, &view, of_rendered, of_posed, Derivatives::Exact).map_err(&in_scene)?;
         if let (Some(layer), Some(shown)) = (&mut self.layer, renderer.underlay_weight()) {
-            layer.step(frame.pose, frame.camera, &of_rendered.image, shown).map_err(&in_scene)?;
+            layer.step(pose, frame.camera, &of_rendered.image, shown).map_err(&in_scene)?;
         }
         let Avatar { gaussians, binding } = &self.parameters.avatar;
         of_avatar.reset(gaussians, matches!(binding, Binding::Face(_)));
+        let pose_rates = poses::rates(&recipe.pose, self.iteration, iterations);
+        let free = self.poses.as_mut().zip(pose_rates);
+        of_body.reset(body.joints.len());
+        let into = Gradients { avatar: Some(of_avatar), body: free.is_some().then_some(&mut *of_body) };
         poser
-            .backward(&self.bound, &body, strategy, &posing, gaussians, of_posed, of_avatar)
+            .backward(&self.bound, &body, strategy, &posing, gaussians, of_posed, into)
             .map_err(&in_strategy)?;
         let frame_name = frame.name.to_owned();
+        if let Some((poses, rates)) = free {
+            let gradient = body.pose_gradient(pose, of_body).map_err(&in_scene)?;
+            let skeleton = &self.sequence.body.skeleton;
+            let stopped = poses.step(frame.pose_index, skeleton, &gradient, (&recipe.pose, rates));
+            self.warnings.extend(stopped.map(|problem| {
+                let sequence = &self.sequence.id;
+                format!("{sequence}: the pose of frame {frame_name} is fitted no further: {problem}; kept as it was")
+            }));
+        }
         self.finish(loss, &frame_name)
     }
 
@@ -393,6 +424,7 @@ impl Scratch {
             of_rendered: RenderedGradient { image: image(), alpha: None },
             of_posed: PosedGradient::default(),
             of_avatar: AvatarGradient::default(),
+            of_body: BodyGradient::default(),
         }
     }
 }
@@ -412,7 +444,7 @@ fn background(choice: FitBackground, seed: u64, iteration: u32) -> [f32; 3] {
 }
 
 /// Straight colours over a background, into memory that is kept.
-fn composite(rgb: &Image, alpha: &Mask, background: [f32; 3], out: &mut Image) {
+pub(crate) fn composite(rgb: &Image, alpha: &Mask, background: [f32; 3], out: &mut Image) {
     if (out.width(), out.height()) != (rgb.width(), rgb.height()) {
         *out = Image::filled(rgb.width(), rgb.height(), background);
     }

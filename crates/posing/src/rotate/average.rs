@@ -8,7 +8,7 @@
 use super::super::blend::{self, Blend};
 use super::super::joints::Joints;
 use super::super::lanes::{LANES, Lanes, identity, put, splat};
-use skinsplat_core::math::average::{Solver, Start, average_rotation, lanes};
+use skinsplat_core::math::average::{Solver, Start, average_rotation, average_rotation_adjoint, lanes};
 use skinsplat_core::math::{Quaternion, rotation};
 
 /// Below this gap of the eigenvalues (over their sum) two joints are decided in `f64`.
@@ -196,6 +196,23 @@ pub(super) fn of_lane(
         average_rotation(quats, weights, solver)
     });
     average.unwrap_or_else(rotation::identity).map(|c| c as f32)
+}
+
+/// [`of_lane`] walked backwards, whatever the solver: calls `add` with the position of each bone and the derivative with respect
+/// to a further rotation of it, from that with respect to one of the average.
+pub(crate) fn adjoint(
+    bones: impl ExactSizeIterator<Item = (Quaternion<f64>, f64)>,
+    solver: Solver,
+    torque: [f64; 3],
+    mut add: impl FnMut(usize, [f64; 3]),
+) {
+    with_bones(bones, |quats, weights| {
+        let Some(average) = average_rotation(quats, weights, solver) else { return };
+        let upstream = rotation::adjoint::from_torque(average, torque);
+        average_rotation_adjoint(quats, weights, solver, upstream, |bone, own| {
+            add(bone, rotation::adjoint::to_torque(quats[bone], own));
+        });
+    });
 }
 
 /// Calls `f` with quaternions and weights as slices, on the stack for any usual number of joints.

@@ -2,7 +2,7 @@
 
 use super::super::lanes::{LANES, Lanes, identity, multiply, put, take};
 use super::block::{BlockInput, Rotated};
-use super::{LbsProjection, Source, average, dual, lbs, polar};
+use super::{LbsProjection, Source, average, dual, lbs, lifted, polar};
 use skinsplat_core::math::average::Solver;
 use skinsplat_core::math::rotation;
 
@@ -36,6 +36,8 @@ pub(crate) fn rotate(arch: pulp::Arch, source: &Source<'_>, input: &BlockInput<'
         }
         Source::PushForward(across) => polar::of_block(arch, input, *across),
         Source::Faces(faces) => faces.of_block(input),
+        Source::Vertices(vertices) => vertices.of_block(input),
+        Source::Lifted(lift) => lifted::summed(lift.quaternions(), input),
         Source::PerBlock(rotations) => rotations(input),
     };
     let posed = multiply(&relative, &input.block.rotations);

@@ -71,12 +71,13 @@ fn face_rotations(
 /// A rotation per used vertex, and how three of them become one.
 pub(crate) struct VertexRotations<'a> {
     /// Per vertex; `None` for unused and degenerate ones.
-    quats: Vec<Option<Quaternion<f32>>>,
-    combine: Combine,
-    embeddings: &'a [Embedding],
+    pub(super) quats: Vec<Option<Quaternion<f32>>>,
+    pub(super) combine: Combine,
+    pub(super) embeddings: &'a [Embedding],
 }
 
-enum Combine {
+#[derive(Clone, Copy)]
+pub(super) enum Combine {
     /// Eq. 7 with barycentric weights.
     Average(Solver),
     /// The normalised weighted sum, signs as they come or aligned to the first corner.
@@ -111,22 +112,16 @@ impl<'a> VertexRotations<'a> {
     /// sign policy.
     pub(super) fn summed(policy: SignPolicy, body: &PosedBody<'_>, surface: &'a Surface) -> Self {
         let faces = &surface.faces;
-        let used = |face: usize| faces.corners[face].iter().any(|&v| surface.vertex_used[v as usize]);
-        let face_rotations = face_rotations(FaceFrame::SplattingAvatar, body, surface, used);
-        let mut sums = vec![([0.0f32; 4], None); surface.vertex_used.len()];
-        for (face, quat) in face_rotations.iter().enumerate() {
-            let Some(quat) = *quat else { continue };
-            for &vertex in &faces.corners[face] {
-                let (sum, first) = &mut sums[vertex as usize];
-                let signed = policy.apply(quat, *first.get_or_insert(quat));
-                for k in 0..4 {
-                    sum[k] += faces.areas[face] * signed[k];
-                }
+        let face_rotations = around_vertices(body, surface);
+        let mut sums = vec![[0.0f32; 4]; surface.vertex_used.len()];
+        for_each_signed(policy, &face_rotations, surface, |vertex, face, signed| {
+            for k in 0..4 {
+                sums[vertex][k] += faces.areas[face] * signed[k];
             }
-        }
+        });
         let areas = &faces.areas;
         let largest = areas.iter().copied().fold(0.0f32, f32::max);
-        let quats = sums.into_iter().map(|(sum, _)| unit(sum, CANCELLED * largest)).collect();
+        let quats = sums.into_iter().map(|sum| unit(sum, CANCELLED * largest)).collect();
         Self { quats, combine: Combine::Sum(policy), embeddings: &surface.embeddings }
     }
 
@@ -163,6 +158,29 @@ impl<'a> VertexRotations<'a> {
                 }
                 unit(sum, CANCELLED)
             }
+        }
+    }
+}
+
+/// The rotations of all faces around used vertices.
+pub(super) fn around_vertices(body: &PosedBody<'_>, surface: &Surface) -> Vec<Option<Quaternion<f32>>> {
+    let used = |face: usize| surface.faces.corners[face].iter().any(|&v| surface.vertex_used[v as usize]);
+    face_rotations(FaceFrame::SplattingAvatar, body, surface, used)
+}
+
+/// Calls `f` with each vertex, each face around it and the rotation of that, signed as the policy has it.
+pub(super) fn for_each_signed(
+    policy: SignPolicy,
+    face_rotations: &[Option<Quaternion<f32>>],
+    surface: &Surface,
+    mut f: impl FnMut(usize, usize, Quaternion<f32>),
+) {
+    let mut first = vec![None; surface.vertex_used.len()];
+    for (face, quat) in face_rotations.iter().enumerate() {
+        let Some(quat) = *quat else { continue };
+        for &vertex in &surface.faces.corners[face] {
+            let reference = *first[vertex as usize].get_or_insert(quat);
+            f(vertex as usize, face, policy.apply(quat, reference));
         }
     }
 }

@@ -225,6 +225,49 @@ fn lane_adjoint(
     sum(of_canonical, rotation::adjoint::quaternion_to_matrix_raw(canonical, &of_own))
 }
 
+/// [`converted`] walked backwards to the blend that it converts, of one lane: from the derivative with respect to what is drawn
+/// and to a further rotation of R.
+pub(crate) fn blend_adjoint(
+    projection: LbsProjection,
+    b: Matrix3<f32>,
+    canonical: Quaternion<f32>,
+    of_posed: Quaternion<f32>,
+    torque: [f32; 3],
+) -> Matrix3<f32> {
+    let own = rotation::quaternion_to_matrix_raw(canonical);
+    let turned = matrix3::multiply(b, own);
+    let raw = rotation::matrix_to_quaternion_raw(turned);
+    let Some(unit) = rotation::normalize(raw) else { return [[0.0; 3]; 3] };
+    let of_length = |of_unit| rotation::adjoint::normalize(unit, 1.0 / dot4(unit, raw), of_unit);
+    let raw_is_drawn = projection == LbsProjection::MatrixToQuaternionRaw;
+    let of_drawn = if raw_is_drawn { of_posed } else { of_length(of_posed) };
+    let of_raw = sum(of_drawn, of_length(rotation::adjoint::from_torque(unit, torque)));
+    let of_turned = rotation::adjoint::matrix_to_quaternion_raw(turned, of_raw);
+    matrix3::multiply(of_turned, matrix3::transpose(own))
+}
+
+/// [`projected`] walked backwards to the blend, of one lane that does not hang on one rigid joint alone: from the derivative with
+/// respect to a further rotation of R. Zero where R is not unique.
+pub(crate) fn projection_adjoint(
+    projection: LbsProjection,
+    b: Matrix3<f32>,
+    relative: Quaternion<f32>,
+    torque: [f32; 3],
+) -> Matrix3<f32> {
+    let projected = match projection {
+        LbsProjection::GramSchmidtRows => rotation::gram_schmidt_rows(b).map(|r| (r, true)),
+        LbsProjection::GramSchmidtColumns => rotation::gram_schmidt_columns(b).map(|r| (r, false)),
+        LbsProjection::Polar | LbsProjection::MatrixToQuaternion | LbsProjection::MatrixToQuaternionRaw => {
+            None
+        }
+    };
+    match projected {
+        Some((r, true)) => rotation::adjoint::gram_schmidt_rows(&b, &r, torque),
+        Some((r, false)) => rotation::adjoint::gram_schmidt_columns(&b, &r, torque),
+        None => super::polar_adjoint(&b, relative, torque),
+    }
+}
+
 #[inline(always)]
 fn sum(a: Quaternion<f32>, b: Quaternion<f32>) -> Quaternion<f32> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]

@@ -6,6 +6,7 @@
 
 use super::super::lanes::{LANES, Lanes, identity, put, splat};
 use super::BlockInput;
+use skinsplat_core::math::rotation::adjoint;
 use skinsplat_core::math::{Quaternion, dot4};
 
 /// A sum shorter than this share of the total weight has no direction: joints of equal weight exactly 360° apart on
@@ -41,4 +42,30 @@ pub(super) fn summed(joints: &[Quaternion<f64>], input: &BlockInput<'_>) -> [Lan
         put(&mut relative, lane, unit);
     }
     relative
+}
+
+/// [`summed`] walked backwards, of one lane: calls `add` with the position of each influence and the derivative with respect to a further rotation
+/// of it, from that with respect to one of the sum. Which signs belong together is a constant.
+pub(crate) fn adjoint(
+    joints: &[Quaternion<f64>],
+    (indices, weights): (&[u16], &[Lanes]),
+    lane: usize,
+    torque: [f64; 3],
+    mut add: impl FnMut(usize, [f64; 3]),
+) {
+    let (mut sum, mut total) = ([0.0; 4], 0.0);
+    for (&joint, weights) in indices.iter().zip(weights) {
+        let (q, weight) = (joints[usize::from(joint)], f64::from(weights[lane]));
+        total += weight;
+        (0..4).for_each(|k| sum[k] += weight * q[k]);
+    }
+    let length = dot4(sum, sum).sqrt();
+    if length <= CANCELLED * total {
+        return;
+    }
+    let of_unit = adjoint::from_torque(sum.map(|c| c / length), torque);
+    for (influence, (&joint, weights)) in indices.iter().zip(weights).enumerate() {
+        let share = f64::from(weights[lane]) / length;
+        add(influence, adjoint::to_torque(joints[usize::from(joint)], of_unit.map(|c| share * c)));
+    }
 }

@@ -8,14 +8,19 @@ mod block;
 mod dispatch;
 mod dual;
 mod faces;
+mod faces_adjoint;
 mod lbs;
 mod lifted;
 mod polar;
+mod to_joints;
 
 pub(crate) use block::{BlockInput, Rotated};
 pub(crate) use dispatch::{drawn_adjoint, means_adjoint, rotate, rotate_by_average, rotation_adjoint};
+pub(crate) use faces_adjoint::{FaceSums, OfFace, to_centroid};
 pub use lbs::LbsProjection;
+pub(crate) use lbs::{blend_adjoint, projection_adjoint};
 pub(crate) use polar::adjoint as polar_adjoint;
+pub(crate) use to_joints::torques_to_joints;
 
 use super::face_frame::FaceFrame;
 use super::joints::Joints;
@@ -264,7 +269,11 @@ pub(crate) enum Source<'a> {
     Faces(FaceRotations<'a>),
     /// The derivative of LBS.
     PushForward(Across),
-    /// Anything else: R of each lane, as unit quaternions.
+    /// One rotation per vertex, combined over the face.
+    Vertices(VertexRotations<'a>),
+    /// Joint quaternions with signs that belong together.
+    Lifted(Cow<'a, JointLift>),
+    /// Anything else: R of each lane, as unit quaternions. No pose is followed through it.
     PerBlock(Box<BlockRotations<'a>>),
 }
 
@@ -286,22 +295,17 @@ impl<'a> Source<'a> {
             RotationChoice::FaceFrame(kind) => {
                 on(&|surface| Self::Faces(FaceRotations::new(kind, body, surface)))
             }
-            RotationChoice::VertexAverage(solver) => on(&|surface| {
-                let vertices = VertexRotations::averaged(solver, joints, body, surface);
-                Self::per_block(move |input| vertices.of_block(input))
-            }),
-            RotationChoice::VertexQuaternions(policy) => on(&|surface| {
-                let vertices = VertexRotations::summed(policy, body, surface);
-                Self::per_block(move |input| vertices.of_block(input))
-            }),
+            RotationChoice::VertexAverage(solver) => {
+                on(&|surface| Self::Vertices(VertexRotations::averaged(solver, joints, body, surface)))
+            }
+            RotationChoice::VertexQuaternions(policy) => {
+                on(&|surface| Self::Vertices(VertexRotations::summed(policy, body, surface)))
+            }
             RotationChoice::JointSum => {
-                let positive = |q: &Quaternion<f64>| SignPolicy::NonNegativeW.apply(*q, *q);
-                let quaternions: Vec<Quaternion<f64>> = joints.rotation_f64.iter().map(positive).collect();
-                Self::per_block(move |input| lifted::summed(&quaternions, input))
+                Self::Lifted(Cow::Owned(JointLift::with_positive_w(body)))
             }
             RotationChoice::LiftedSum => {
-                let lift = lift.map_or_else(|| Cow::Owned(JointLift::from_rest(body)), Cow::Borrowed);
-                Self::per_block(move |input| lifted::summed(lift.quaternions(), input))
+                Self::Lifted(lift.map_or_else(|| Cow::Owned(JointLift::from_rest(body)), Cow::Borrowed))
             }
         }
     }

@@ -156,6 +156,7 @@ fn fit(gradient: &mut PosedGradient, posed: &Posed) {
     gradient.factors.resize(n, Mat3::ZERO);
     gradient.opacities.resize(n, 0.0);
     gradient.sh.resize(posed.sh.len(), [0.0; 3]);
+    gradient.view_frames.resize(posed.view_frames.map_or(0, <[_]>::len), Mat3::ZERO);
     gradient.screen.resize(n, [0.0; 2]);
     gradient.radii.resize(n, 0.0);
 }

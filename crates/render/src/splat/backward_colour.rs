@@ -12,7 +12,7 @@ use skinsplat_core::scene::ColourClamp;
 pub(super) struct Touched(pub(super) u16);
 
 impl Touched {
-    fn has(self, lane: usize) -> bool {
+    pub(super) fn has(self, lane: usize) -> bool {
         self.0 >> lane & 1 == 1
     }
 }
@@ -127,17 +127,18 @@ fn store_coefficients<const K: usize, L: Lanes>(
     }
 }
 
-/// Derivatives with respect to the mean, from those with respect to the basis functions. The frame by columns.
+/// Derivatives with respect to the way F d in which SH are read, from those with respect to the basis functions.
 #[inline(always)]
-pub(super) fn mean<L: Lanes>(
-    direction: &Direction<L>,
-    frame: Option<[[Wide<L>; 3]; 3]>,
-    by_basis: &[Wide<L>; 16],
-) -> [Wide<L>; 3] {
+pub(super) fn turned<L: Lanes>(direction: &Direction<L>, by_basis: &[Wide<L>; 16]) -> [Wide<L>; 3] {
     let d = direction.unit;
     let along = along_basis(d, by_basis);
     let radial = dot(d, along);
-    let turned = each([0, 1, 2], |i| d[i].neg_mul_add(radial, along[i]) * direction.inverse_length);
+    each([0, 1, 2], |i| d[i].neg_mul_add(radial, along[i]) * direction.inverse_length)
+}
+
+/// Derivatives with respect to the mean, from those of [`turned`]. The frame by columns.
+#[inline(always)]
+pub(super) fn mean<L: Lanes>(frame: Option<[[Wide<L>; 3]; 3]>, turned: [Wide<L>; 3]) -> [Wide<L>; 3] {
     match frame {
         Some([x, y, z]) => [dot(x, turned), dot(y, turned), dot(z, turned)],
         None => turned,

@@ -20,6 +20,8 @@ pub(super) struct Output<'a> {
     factors: &'a mut [Mat3],
     opacities: &'a mut [f32],
     sh: &'a mut [[f32; 3]],
+    /// Empty where Gaussians have no frames.
+    view_frames: &'a mut [Mat3],
     screen: &'a mut [[f32; 2]],
     radii: &'a mut [f32],
 }
@@ -31,25 +33,30 @@ impl<'a> Output<'a> {
         chunk: usize,
         coefficients: usize,
     ) -> impl IndexedParallelIterator<Item = Self> {
-        let PosedGradient { means, factors, opacities, sh, screen, radii } = gradient;
+        let PosedGradient { means, factors, opacities, sh, view_frames, screen, radii } = gradient;
+        let mut frames = view_frames.chunks_mut(chunk);
+        let frames: Vec<&mut [Mat3]> =
+            (0..means.len().div_ceil(chunk)).map(|_| frames.next().unwrap_or_default()).collect();
         let parts = means
             .par_chunks_mut(chunk)
             .zip(factors.par_chunks_mut(chunk))
             .zip(opacities.par_chunks_mut(chunk))
             .zip(sh.par_chunks_mut(chunk * coefficients))
+            .zip(frames)
             .zip(screen.par_chunks_mut(chunk))
             .zip(radii.par_chunks_mut(chunk));
-        parts.map(|(((((means, factors), opacities), sh), screen), radii)| Self {
+        parts.map(|((((((means, factors), opacities), sh), view_frames), screen), radii)| Self {
             means,
             factors,
             opacities,
             sh,
+            view_frames,
             screen,
             radii,
         })
     }
 
-    /// Writes all but the SH of the Gaussians from `start` on.
+    /// Writes all but SH and frames of the Gaussians from `start` on.
     #[inline(always)]
     fn write<L: Lanes>(&mut self, start: usize, count: usize, gradient: &SourceGradient<L>) {
         let SourceGradient { mean, factor: [f, g, h], opacity, screen, radius } = *gradient;
@@ -141,6 +148,7 @@ impl BackwardGaussians<'_, '_> {
         let sh = start * self.coefficients()..(start + count) * self.coefficients();
         if visible == 0 {
             self.out.sh[sh].fill([0.0; 3]);
+            self.no_frames(start, count);
             return self.out.write(start, count, &gradient);
         }
         let sums = Wide::load_transposed(l, &rows);
@@ -155,6 +163,7 @@ impl BackwardGaussians<'_, '_> {
         gradient = source.adjoint(self.projection, [power, x, y, xx, xy, yy], self.derivatives);
         if touched == 0 {
             self.out.sh[sh].fill([0.0; 3]);
+            self.no_frames(start, count);
         } else {
             let colour = [sums[COLOUR_SUMS], sums[COLOUR_SUMS + 1], sums[COLOUR_SUMS + 2]];
             let frames = group.frames.map(|frames| each(frames, |column| each(column, load)));
@@ -190,7 +199,40 @@ impl BackwardGaussians<'_, '_> {
             9 => backward_colour::coefficients::<9, L>(l, sh, &basis, rgb, clamp, touched, out),
             _ => backward_colour::coefficients::<16, L>(l, sh, &basis, rgb, clamp, touched, out),
         };
-        backward_colour::mean(&direction, frames, &by_basis)
+        let turned = backward_colour::turned(&direction, &by_basis);
+        if frames.is_some() {
+            self.write_frames(l, start, count, mean, turned, touched);
+        }
+        backward_colour::mean(frames, turned)
+    }
+
+    fn no_frames(&mut self, start: usize, count: usize) {
+        if !self.out.view_frames.is_empty() {
+            self.out.view_frames[start..start + count].fill(Mat3::ZERO);
+        }
+    }
+
+    /// Writes the derivatives with respect to the frames F, which turn the way d from the camera: those with respect to F d
+    /// times dᵀ.
+    #[inline(never)]
+    fn write_frames<L: Lanes>(
+        &mut self,
+        l: L,
+        start: usize,
+        count: usize,
+        mean: [Wide<L>; 3],
+        turned: [Wide<L>; 3],
+        touched: Touched,
+    ) {
+        let camera = self.projection.position;
+        let way = each([0, 1, 2], |i| (mean[i] - Wide::splat(l, camera[i])).store());
+        let turned = each(turned, Wide::store);
+        for (lane, frame) in self.out.view_frames[start..start + count].iter_mut().enumerate() {
+            let own = Vec3::from_array(turned.map(|axis| axis[lane]));
+            let column = |axis: usize| own * way[axis][lane];
+            let is_touched = touched.has(lane);
+            *frame = if is_touched { Mat3::from_cols(column(0), column(1), column(2)) } else { Mat3::ZERO };
+        }
     }
 
     fn coefficients(&self) -> usize {

@@ -12,6 +12,7 @@
 //! line in R⁴) off the eigenspace is passed over. For two bones that is the first bone itself. The rule commutes with
 //! rotations of the world and of the rest pose, like the average.
 
+mod adjoint;
 pub mod eigen;
 pub mod lanes;
 mod power;
@@ -19,6 +20,7 @@ mod solver;
 mod squaring;
 mod two_bones;
 
+pub use adjoint::average_rotation_adjoint;
 pub use power::power_iterate;
 pub use solver::{ParseSolverError, Solver, Start};
 pub use two_bones::two_bones;

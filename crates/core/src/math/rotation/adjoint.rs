@@ -1,7 +1,7 @@
 //! Conversions walked backwards: from derivatives of a loss with respect to what a conversion returned to those with
 //! respect to what it was given (transposed Jacobians).
 
-use super::super::{Matrix3, Quaternion, Real, dot4};
+use super::super::{Matrix3, Quaternion, Real, dot4, matrix3};
 use super::convert::{Leading, four_outer_product, leading};
 
 /// Of [`quaternion_to_matrix_raw`](super::quaternion_to_matrix_raw) at `q`; each component of `q` by itself.
@@ -56,6 +56,84 @@ pub fn normalize<T: Real>(unit: Quaternion<T>, inverse_length: T, g: Quaternion<
 pub fn from_torque<T: Real>(unit: Quaternion<T>, [x, y, z]: [T; 3]) -> Quaternion<T> {
     let two = T::from_f64(2.0);
     super::multiply([T::ZERO, two * x, two * y, two * z], unit)
+}
+
+/// How a loss changes if a unit quaternion is turned on by ω (axis times angle, at 0), `exp(ω/2) ⊗ q`, from the derivative
+/// with respect to its components: the other way round from [`from_torque`].
+#[inline]
+pub fn to_torque<T: Real>(unit: Quaternion<T>, gradient: Quaternion<T>) -> [T; 3] {
+    let half = T::from_f64(0.5);
+    [0, 1, 2].map(|axis: usize| {
+        let mut turn = [T::ZERO; 4];
+        turn[axis + 1] = half;
+        dot4(super::multiply(turn, unit), gradient)
+    })
+}
+
+/// How a loss changes if a rotation matrix is turned on by ω, `exp(ω) R`, from the derivative with respect to its entries:
+/// the sum over columns of r × g.
+#[inline]
+pub fn matrix_to_torque<T: Real>(r: &Matrix3<T>, gradient: &Matrix3<T>) -> [T; 3] {
+    let (columns, own) = (matrix3::transpose(*r), matrix3::transpose(*gradient));
+    let of_column = |k: usize| matrix3::cross(columns[k], own[k]);
+    matrix3::add_scaled(matrix3::add_scaled(of_column(0), T::ONE, of_column(1)), T::ONE, of_column(2))
+}
+
+/// Below this determinant, relative to the cube of the trace, two rotations are as near as each other.
+const SINGULAR: f64 = 1e-12;
+
+/// Of [`polar`](super::polar) at `m`, whose nearest rotation is `r`: the derivative with respect to `m`, from that with respect
+/// to a further rotation `exp(ω) R`. With m = R P and P symmetric, (tr P I − P) ω' = vee(Rᵀ dm − dmᵀ R) for ω' = Rᵀ ω. Zero
+/// where that has no answer.
+///
+/// For a blend m = Σ w R(q) it is the derivative of the average of Eq. 7: the eigenvalues of tr P I − P are 2 (λ1 − λ_k) for
+/// those of Σ w q qᵀ.
+pub fn nearest_rotation(m: &Matrix3<f64>, r: Quaternion<f64>, torque: [f64; 3]) -> Matrix3<f64> {
+    let r = super::quaternion_to_matrix_raw(r);
+    let p = matrix3::multiply(matrix3::transpose(r), *m);
+    let trace = p[0][0] + p[1][1] + p[2][2];
+    let mut a = [[0.0; 3]; 3];
+    for row in 0..3 {
+        for column in 0..3 {
+            a[row][column] = -0.5 * (p[row][column] + p[column][row]);
+        }
+        a[row][row] += trace;
+    }
+    let back = matrix3::apply(matrix3::transpose(r), torque);
+    let cofactors = [matrix3::cross(a[1], a[2]), matrix3::cross(a[2], a[0]), matrix3::cross(a[0], a[1])];
+    let determinant = matrix3::dot(a[0], cofactors[0]);
+    if determinant.abs() <= SINGULAR * (trace * trace * trace).abs() {
+        return [[0.0; 3]; 3];
+    }
+    // a is symmetric, and its cofactors with it.
+    let [x, y, z] = matrix3::apply(cofactors, back).map(|c| c / determinant);
+    let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+    matrix3::multiply(r, cross)
+}
+
+/// Of [`gram_schmidt_columns`](super::gram_schmidt_columns) at `m`, which made `r` of it, from the derivative with respect to a
+/// further rotation `exp(ω) R`.
+pub fn gram_schmidt_columns<T: Real>(m: &Matrix3<T>, r: &Matrix3<T>, torque: [T; 3]) -> Matrix3<T> {
+    let ([a, b, _], [x, y, z]) = (matrix3::transpose(*m), matrix3::transpose(*r));
+    let along = |axis| matrix3::dot(torque, axis);
+    // da turns x about y and z, and takes y along; what of db is across x turns the pair about x.
+    let length = matrix3::dot(a, x);
+    let (share, height) = (matrix3::dot(b, x), matrix3::dot(b, y));
+    let zero = T::ZERO;
+    let scaled = |k: T, v: [T; 3]| matrix3::add_scaled([zero; 3], k, v);
+    // δx·y = ω·z, δx·z = −ω·y, δy·z = ω·x.
+    let of_a_along_y = along(z) / length;
+    let of_a_along_z = -(along(y) / length) - along(x) * share / (height * length);
+    let of_a = matrix3::add_scaled(scaled(of_a_along_y, y), of_a_along_z, z);
+    let of_b = scaled(along(x) / height, z);
+    matrix3::transpose([of_a, of_b, [zero; 3]])
+}
+
+/// Of [`gram_schmidt_rows`](super::gram_schmidt_rows), as [`gram_schmidt_columns`]: Rᵀ is that of mᵀ, and turns by −Rᵀ ω.
+pub fn gram_schmidt_rows<T: Real>(m: &Matrix3<T>, r: &Matrix3<T>, torque: [T; 3]) -> Matrix3<T> {
+    let transposed = matrix3::transpose(*r);
+    let back = matrix3::apply(transposed, torque).map(|c| -c);
+    matrix3::transpose(gram_schmidt_columns(&matrix3::transpose(*m), &transposed, back))
 }
 
 #[cfg(test)]
@@ -141,6 +219,58 @@ mod tests {
                 half[1 + axis] = 0.5;
                 assert!((dot4(back, rotation::multiply(half, unit)) - torque[axis]).abs() < 1e-14);
             }
+        }
+    }
+
+    /// A matrix near to a proper rotation, but sheared.
+    fn sheared(seed: usize) -> Matrix3<f64> {
+        let mut m = rows(std::array::from_fn(|k| wave(seed, k)));
+        (0..3).for_each(|k| m[k][k] += 1.5);
+        m
+    }
+
+    /// With respect to a further rotation, from the derivative with respect to the entries of the rotation.
+    fn torque(q: Quaternion<f64>, g: [f64; 9]) -> [f64; 3] {
+        matrix_to_torque(&rotation::quaternion_to_matrix_raw(q), &rows(g))
+    }
+
+    #[test]
+    fn nearest_rotations() {
+        for seed in 0..200 {
+            let (m, g) = (sheared(seed), std::array::from_fn(|k| wave(seed, 40 + k)));
+            let q = rotation::polar(m).unwrap();
+            let found = nearest_rotation(&m, q, torque(q, g));
+            assert_derivative(flat(m), g, flat(found), |m| {
+                flat(rotation::quaternion_to_matrix_raw(rotation::polar(rows(m)).unwrap()))
+            });
+        }
+    }
+
+    #[test]
+    fn gram_schmidt_over_columns_and_rows() {
+        for seed in 0..200 {
+            let (m, g) = (sheared(seed), std::array::from_fn(|k| wave(seed, 40 + k)));
+            let check =
+                |r: Matrix3<f64>, found: Matrix3<f64>, project: fn(Matrix3<f64>) -> Option<Matrix3<f64>>| {
+                    assert_eq!(project(m), Some(r));
+                    assert_derivative(flat(m), g, flat(found), |m| flat(project(rows(m)).unwrap()));
+                };
+            let r = rotation::gram_schmidt_columns(m).unwrap();
+            let of_r = matrix_to_torque(&r, &rows(g));
+            check(r, gram_schmidt_columns(&m, &r, of_r), rotation::gram_schmidt_columns);
+            let r = rotation::gram_schmidt_rows(m).unwrap();
+            let of_r = matrix_to_torque(&r, &rows(g));
+            check(r, gram_schmidt_rows(&m, &r, of_r), rotation::gram_schmidt_rows);
+        }
+    }
+
+    #[test]
+    fn torques_there_and_back() {
+        for seed in 0..50 {
+            let unit = rotation::normalize([0, 1, 2, 3].map(|k| wave(seed, k))).unwrap();
+            let own = [0, 1, 2].map(|k| wave(seed, 30 + k));
+            let back = to_torque(unit, from_torque(unit, own));
+            assert!(back.iter().zip(own).all(|(a, b)| (a - b).abs() < 1e-14));
         }
     }
 }
