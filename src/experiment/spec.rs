@@ -1,8 +1,8 @@
 //! The experiment file: one table, described as data.
 
 use super::{
-    EMBEDDED, Error, FURTHER, Grid, Paper, Profile, Replicate, Source, Split, TestPoses, catalog, grid, poses,
-    seeds, validate,
+    EMBEDDED, Error, FURTHER, Grid, Paper, Profile, Replicate, Source, Split, TestPoses, catalog, grid,
+    poses, seeds, validate,
 };
 use serde::{Deserialize, Serialize};
 use skinsplat_data::{Capture, Gender};

@@ -28,8 +28,8 @@ mod replicates;
 mod results;
 pub mod timing;
 
-pub use bend::{bend_csv, bend_plots};
 pub use crate::run::gallery::picture_name;
+pub use bend::{bend_csv, bend_plots};
 pub use collect::results;
 pub use comparison::{Comparison, MetricDifference};
 pub use curves::{curve_plots, curves_csv};

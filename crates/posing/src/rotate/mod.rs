@@ -301,9 +301,7 @@ impl<'a> Source<'a> {
             RotationChoice::VertexQuaternions(policy) => {
                 on(&|surface| Self::Vertices(VertexRotations::summed(policy, body, surface)))
             }
-            RotationChoice::JointSum => {
-                Self::Lifted(Cow::Owned(JointLift::with_positive_w(body)))
-            }
+            RotationChoice::JointSum => Self::Lifted(Cow::Owned(JointLift::with_positive_w(body))),
             RotationChoice::LiftedSum => {
                 Self::Lifted(lift.map_or_else(|| Cow::Owned(JointLift::from_rest(body)), Cow::Borrowed))
             }
