@@ -29,6 +29,7 @@ impl PartialEq for FrameRecord {
 /// Score or failure of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[allow(clippy::large_enum_variant, reason = "scored is the usual one")]
 pub enum Outcome {
     /// Rendered and scored.
     Scored {

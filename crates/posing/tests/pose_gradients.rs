@@ -81,7 +81,7 @@ impl Loss {
 
 /// What is differentiated: the vectors of [`Pose::turned`], then the translation.
 fn moved(pose: &Pose, coordinate: usize, step: f64) -> Pose {
-    let mut vectors = vec![DVec3::ZERO; rig::JOINTS + 1];
+    let mut vectors = [DVec3::ZERO; rig::JOINTS + 1];
     vectors[coordinate / 3][coordinate % 3] = step;
     pose.turned(&vectors[..rig::JOINTS], vectors[rig::JOINTS])
 }
