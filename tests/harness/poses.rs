@@ -43,9 +43,9 @@ fn table(experiment: &Experiment, records: impl Fn(&Plan) -> Records) -> TableRe
     report::results(&plan, std::slice::from_ref(experiment), &records(&plan)).unwrap().tables.remove(0)
 }
 
-/// The rows that are not the paper's own.
+/// The rows of this run alone.
 fn measured(found: &TableResults) -> impl Iterator<Item = &Row> {
-    found.table.rows.iter().filter(|row| row.kind != RowKind::Paper)
+    found.table.rows.iter().filter(|row| matches!(row.kind, RowKind::Measured | RowKind::Mean))
 }
 
 #[test]
