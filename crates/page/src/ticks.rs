@@ -16,17 +16,20 @@ const MOST: f64 = 6.0;
 impl Axis {
     /// An axis that shows all of these values; those that are not finite, or not above 0 on a logarithmic one, are left out.
     pub(super) fn of(values: impl Iterator<Item = f64>, log: bool) -> Self {
-        let shown = values.filter(|v| v.is_finite() && (!log || *v > 0.0));
-        let [low, high] =
-            shown.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
+        let shown: Vec<f64> = values.filter(|v| v.is_finite() && (!log || *v > 0.0)).collect();
+        // Nothing lies between two frames.
+        let whole = shown.iter().all(|v| v.fract() == 0.0);
+        let [low, high] = shown
+            .into_iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
         let [low, high] = if low <= high { [low, high] } else { [1.0, 10.0] };
-        if log { Self::logarithmic(low, high) } else { Self::linear(low, high) }
+        if log { Self::logarithmic(low, high) } else { Self::linear(low, high, whole) }
     }
 
-    fn linear(low: f64, high: f64) -> Self {
+    fn linear(low: f64, high: f64, whole: bool) -> Self {
         let span = if high > low { high - low } else { high.abs().max(1.0) * 0.1 };
         let (low, high) = (low - 0.04 * span, high + 0.04 * span);
-        let step = round_step((high - low) / MOST);
+        let step = round_step((high - low) / MOST).max(if whole { 1.0 } else { 0.0 });
         let decimals = (0..12).find(|d| (0..*d).fold(step, |s, _| s * 10.0) > 0.999).unwrap_or(12);
         let first = (low / step).ceil() as i64;
         let last = (high / step).floor() as i64;
@@ -118,6 +121,7 @@ mod tests {
             axis.ticks.into_iter().map(|(_, label)| label).collect::<Vec<_>>()
         };
         assert_eq!(labels(0.0, 5.0), ["0", "1", "2", "3", "4", "5"]);
+        assert_eq!(labels(0.0, 2.0), ["0", "1", "2"], "frames are whole");
         assert_eq!(labels(30.1, 30.4), ["30.1", "30.2", "30.3", "30.4"]);
         assert!(!labels(7.0, 7.0).is_empty() && !labels(0.0, 0.0).is_empty());
         assert!(Axis::of(std::iter::empty(), false).low < 10.0);

@@ -62,7 +62,8 @@ fn chart(family: &str, axis: &str, subjects: Subjects<'_>) -> Option<Chart> {
     };
     let (bad, good): (Vec<_>, Vec<_>) = subjects.into_iter().partition(|(_, rows)| off(rows));
     let inputs: Vec<f64> = bad.first()?.1.iter().map(|(x, _)| *x).collect();
-    let wide = inputs.iter().all(|x| *x > 0.0)
+    let wide = !axis.ends_with("degrees")
+        && inputs.iter().all(|x| *x > 0.0)
         && inputs.iter().copied().fold(f64::INFINITY, f64::min) * 1e3
             < inputs.iter().copied().fold(0.0, f64::max);
     let holding: Vec<&str> = good.iter().map(|(subject, _)| *subject).collect();
