@@ -26,6 +26,7 @@ pub const FURTHER: &[(&str, &str)] = &[
     ("experiments/budget.toml", include_str!("../../experiments/budget.toml")),
     ("experiments/ci.toml", include_str!("../../experiments/ci.toml")),
     ("experiments/engines.toml", include_str!("../../experiments/engines.toml")),
+    ("experiments/lights.toml", include_str!("../../experiments/lights.toml")),
     ("experiments/noise.toml", include_str!("../../experiments/noise.toml")),
     ("experiments/parts.toml", include_str!("../../experiments/parts.toml")),
     ("experiments/pushforward.toml", include_str!("../../experiments/pushforward.toml")),

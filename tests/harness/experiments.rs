@@ -47,6 +47,7 @@ fn the_experiments_load_from_the_folder_and_are_the_embedded_ones() {
         "budget",
         "ci",
         "engines",
+        "lights",
         "noise",
         "parts",
         "pushforward",

@@ -64,6 +64,10 @@ pub enum Lights {
     /// several cameras one view of the surface appears under different lights, which no function of the view follows.
     #[default]
     World,
+    /// The camera, as a rig of lamps around the lens: where a camera at +Z that looks along -Z finds [`Lights::World`]'s, every
+    /// camera finds them. To one camera that never moves it is a studio that may have been turned; to several, a view of the
+    /// surface always appears under the same lights.
+    Camera,
     /// The surface: colours are those of the rest pose seen from the direction that the local rotation (the polar factor
     /// of the blend) takes to the rest pose. Not physical, but the question whether SH must turn with the surface then has
     /// an exact answer.

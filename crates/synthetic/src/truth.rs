@@ -4,7 +4,7 @@ use super::figure::Figure;
 use super::lighting::{self, Finish};
 use super::material::Material;
 use super::parameters::{Lights, Rig};
-use glam::{DMat3, Quat, Vec3};
+use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
 use skinsplat_core::math::portable;
 use skinsplat_core::math::rotation::nearest_rotation;
 use skinsplat_core::scene::{Camera, Pose, PosedBody, SceneError};
@@ -30,8 +30,12 @@ impl Model {
         let posed = PosedBody::new(body, pose)?;
         let surface = posed.mesh();
         let to_rest = match self.lights {
-            Lights::World => None,
+            Lights::World | Lights::Camera => None,
             Lights::Body => Some(rest_from_world_rotations(&posed)),
+        };
+        let to_studio = match self.lights {
+            Lights::World | Lights::Body => Mat3::IDENTITY,
+            Lights::Camera => studio_from_world(camera),
         };
         let eye = camera.position().as_vec3();
         let mesh = mesh::Mesh::new(&surface.vertices, &body.faces)?;
@@ -44,7 +48,7 @@ impl Model {
             let finish = self.finish(blend(&self.figure.material_positions));
             let to_eye = (eye - fragment.position).normalize_or_zero();
             let (normal, view) = match &to_rest {
-                None => (blend(&surface.normals), to_eye),
+                None => (to_studio * blend(&surface.normals), to_studio * to_eye),
                 Some(turns) => {
                     let view = (0..3).map(|k| (turns[corners[k]] * to_eye) * fragment.barycentric[k]).sum();
                     (blend(&self.figure.rest_normals), view)
@@ -66,6 +70,13 @@ impl Model {
             }
         }
     }
+}
+
+/// From world directions to those of a studio whose lights are where a camera at +Z that looks along -Z has them: camera axes
+/// (x right, y down, z forward) are its X, -Y, -Z.
+fn studio_from_world(camera: &Camera) -> Mat3 {
+    let turn = DMat3::from_mat4(camera.camera_from_world);
+    (DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)) * turn).as_mat3()
 }
 
 /// Per vertex, the inverse of the rotation nearest to its blend: from world to rest directions.
@@ -132,5 +143,25 @@ mod tests {
         assert!(on_body < 0.06, "{on_body}");
         let in_world = change_under_a_turn(Lights::World);
         assert!(in_world > 0.6, "{in_world}");
+    }
+
+    #[test]
+    fn lights_on_the_camera_turn_with_it() {
+        let with_camera = change_under_a_turn(Lights::Camera);
+        assert!(with_camera < 0.06, "{with_camera}");
+    }
+
+    #[test]
+    fn a_camera_in_front_has_the_lights_of_the_world() {
+        let (world, pose, camera) = model(Lights::World);
+        let front = Camera {
+            camera_from_world: DMat4::from_diagonal(glam::DVec4::new(1.0, -1.0, -1.0, 1.0))
+                * DMat4::from_translation(DVec3::new(0.0, -0.9, -3.0)),
+            ..camera
+        };
+        let on_camera = Model { lights: Lights::Camera, ..world.clone() };
+        let images = [world, on_camera].map(|model| model.draw(&pose, &front).unwrap().colour);
+        assert!(images[0].pixels().iter().any(|p| p[0] > 0.1), "the subject is in view");
+        assert_eq!(images[0].pixels(), images[1].pixels());
     }
 }

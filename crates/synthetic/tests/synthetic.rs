@@ -371,6 +371,7 @@ fn parameters_survive_toml_and_every_one_changes_the_key() {
         "seed = 2",
         "samples = 4",
         "lights = \"body\"",
+        "lights = \"camera\"",
         "rig = { kind = \"figure\", girth = 1.1 }",
         "rig = { kind = \"arm\" }",
         "motion = { twist_degrees = 1.0 }",
