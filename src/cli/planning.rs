@@ -89,7 +89,7 @@ impl Planning {
         let networks = self.lpips.networks()?;
         let given = |(net, digest): (_, &str)| GivenWeights { net, digest: digest.to_owned() };
         let lpips_weights = networks.given().map(given);
-        let options = Options { profile: self.profile(), subset, lpips_weights };
+        let options = Options { profile: self.profile(), subset, lpips_weights, seeds: self.seeds.clone() };
         let described = library.describe()?;
         renders_were_found(&described)?;
         let plan = experiment::plan(&experiments, &described, &options)?;

@@ -9,8 +9,8 @@ use toml::Value;
 /// Most variants of an experiment.
 const MOST: usize = 1000;
 
-/// Axes, and a variant in whose texts `{AXIS}` stands for a choice of each: in `id` for its id, in `label` for its label,
-/// everywhere else for its value.
+/// Axes, and a variant in whose texts `{AXIS}` stands for a choice of each: in `id` and `against` for its id, in `label` for its
+/// label, everywhere else for its value.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
@@ -112,7 +112,7 @@ impl Grid {
         let mut table = self.variant.clone();
         for (field, value) in &mut table {
             let meaning = match field.as_str() {
-                "id" => Meaning::Id,
+                "id" | "against" => Meaning::Id,
                 "label" => Meaning::Label,
                 _ => Meaning::Value,
             };

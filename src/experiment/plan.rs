@@ -181,7 +181,7 @@ impl Builder<'_> {
         let protocol = Arc::new(catalog::protocol(experiment.protocol_on(source)).map_err(invalid)?);
         let wanted = &self.options.subset.variants;
         let variants: Vec<(usize, &Variant)> = (experiment.variants.iter().enumerate())
-            .filter(|(_, variant)| wanted.is_empty() || wanted.contains(&variant.id))
+            .filter(|(_, variant)| wanted.is_empty() || wanted.iter().any(|id| variant.is_called(id)))
             .collect();
         let with_data = |(_, row): &(usize, &DataRow)| row.missing.is_none() && !variants.is_empty();
         for (row_index, row) in rows.iter().enumerate().filter(with_data) {
@@ -370,7 +370,7 @@ fn subset_names_something(
     let subjects: BTreeSet<&str> =
         datasets.iter().flat_map(|d| &d.subjects).map(|subject| subject.id.as_str()).collect();
     let variants: BTreeSet<&str> =
-        experiments.iter().flat_map(|e| &e.variants).map(|variant| variant.id.as_str()).collect();
+        experiments.iter().flat_map(|e| &e.variants).flat_map(Variant::names).collect();
     let subset = &options.subset;
     for (key, asked, known) in
         [("subjects", &subset.subjects, subjects), ("variants", &subset.variants, variants)]

@@ -107,6 +107,9 @@ pub struct Options {
     /// Weights of LPIPS that did not come with the program.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lpips_weights: Option<GivenWeights>,
+    /// Seeds with which every fit is repeated, where an experiment has none of its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seeds: Vec<u64>,
 }
 
 /// Weights of an LPIPS network that were read from a file.

@@ -9,6 +9,8 @@ const MOST: usize = 100;
 /// Which variant of the file a variant repeats, and with which seed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Replicate {
+    /// Id of the variant in the file.
+    pub id: String,
     /// Label of the variant in the file.
     pub label: String,
     /// Seed of the fit.
@@ -75,7 +77,7 @@ fn repeat(variant: &Variant, seed: u64) -> Variant {
     let mut repeated = Variant {
         id: format!("{}-{seed}", variant.id),
         label: format!("{} (seed {seed})", variant.label),
-        replicate: Some(Replicate { label: variant.label.clone(), seed }),
+        replicate: Some(Replicate { id: variant.id.clone(), label: variant.label.clone(), seed }),
         ..variant.clone()
     };
     if let AvatarRecipe::Fit { seed: own, .. } = &mut repeated.avatar {

@@ -234,9 +234,24 @@ pub struct Variant {
     /// From how many training sequences (takes) of a subject its avatar is made; from the first one if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub takes: Option<u32>,
+    /// Ids of variants, besides the baseline, that it is compared with over all sequences.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub against: Vec<String>,
     /// The variant of the file that this one repeats.
     #[serde(skip)]
     pub replicate: Option<Replicate>,
+}
+
+impl Variant {
+    /// Its id, and that of the variant of the file which it repeats.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        [Some(self.id.as_str()), self.replicate.as_ref().map(|of| of.id.as_str())].into_iter().flatten()
+    }
+
+    /// Whether an id names it, or the variant of the file which it repeats.
+    pub fn is_called(&self, id: &str) -> bool {
+        self.names().any(|name| name == id)
+    }
 }
 
 /// Where an avatar comes from.
@@ -408,6 +423,7 @@ impl Experiment {
                         preset.title.to_owned()
                     },
                     paper: None,
+                    against: Vec::new(),
                     strategy: Some(preset.id.to_owned()),
                     replicate: None,
                     ..model.clone()

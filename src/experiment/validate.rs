@@ -49,6 +49,12 @@ pub(super) fn experiment(e: &Experiment, file: &str) -> Result<(), Error> {
     if e.variant(&e.baseline).is_none() {
         return fail("baseline", format!("`{}`", e.baseline), "the id of one of the variants");
     }
+    for (i, variant) in e.variants.iter().enumerate() {
+        if let Some(id) = variant.against.iter().find(|id| e.variant(id).is_none()) {
+            let key = format!("variants[{i}].against");
+            return fail(&key, format!("`{id}`"), "ids of variants of the table");
+        }
+    }
     if let Some(i) = e.columns.iter().position(|c| c.decimals() > 12) {
         return fail(&format!("columns[{i}].decimals"), format!("{}", e.columns[i].decimals()), "at most 12");
     }

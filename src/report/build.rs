@@ -227,27 +227,35 @@ fn mean_content(contents: &[Content]) -> Content {
     Content::number(values.sum::<f64>() / contents.len() as f64)
 }
 
-/// Every variant against the baseline, on each sequence and on all of them.
+/// Every variant against the baseline, on each sequence and on all of them, and on all of them against what else it asks for.
 pub(super) fn comparisons(experiment: &Experiment, sequences: &[SequenceResults]) -> Vec<Comparison> {
     let Some(first) = sequences.first() else { return Vec::new() };
     let groups = groups(experiment, &first.variants);
-    let Some(b) = first.variants.iter().position(|v| v.id == experiment.baseline) else { return Vec::new() };
-    let Some(baseline) = groups.iter().find(|group| group.members.contains(&b)) else { return Vec::new() };
-    let others: Vec<&Group> = groups.iter().filter(|group| !group.members.contains(&b)).collect();
-    let compare = |sequence: Option<String>, over: &[SequenceResults], group: &Group| Comparison {
+    let find = |id: &str| groups.iter().find(|group| group.is_called(id, experiment, &first.variants));
+    let with_baseline: Vec<Pair<'_>> = find(&experiment.baseline).map_or_else(Vec::new, |baseline| {
+        let others = groups.iter().filter(|group| group.label != baseline.label);
+        others.map(|candidate| Pair { candidate, baseline }).collect()
+    });
+    let compare = |sequence: Option<String>, over: &[SequenceResults], pair: Pair<'_>| Comparison {
         sequence,
-        variant: group.label.clone(),
-        baseline: baseline.label.clone(),
-        differences: differences(experiment, over, Pair { candidate: group, baseline }),
+        variant: pair.candidate.label.clone(),
+        baseline: pair.baseline.label.clone(),
+        differences: differences(experiment, over, pair),
     };
     let mut all: Vec<Comparison> = Vec::new();
     for sequence in sequences {
         let one = std::slice::from_ref(sequence);
-        all.extend(others.iter().map(|group| compare(Some(sequence.label.clone()), one, group)));
+        all.extend(with_baseline.iter().map(|&pair| compare(Some(sequence.label.clone()), one, pair)));
     }
-    if sequences.len() > 1 {
-        all.extend(others.iter().map(|group| compare(None, sequences, group)));
-    }
+    let asked = groups.iter().flat_map(|candidate| {
+        let variant = experiment.variant(&first.variants[candidate.members[0]].id);
+        let against = variant.map_or(&[][..], |variant| variant.against.as_slice());
+        let others = against.iter().filter_map(|id| find(id)).filter(|group| group.label != candidate.label);
+        others.map(move |baseline| Pair { candidate, baseline })
+    });
+    let asked = asked.filter(|pair| !with_baseline.iter().any(|known| known.is(pair)));
+    let whole = if sequences.len() > 1 { with_baseline.as_slice() } else { &[] };
+    all.extend(whole.iter().copied().chain(asked).map(|pair| compare(None, sequences, pair)));
     all
 }
 

@@ -13,6 +13,11 @@ pub(super) struct Pair<'a> {
 }
 
 impl Pair<'_> {
+    /// Whether both compare the same rows.
+    pub(super) fn is(&self, other: &Pair<'_>) -> bool {
+        self.candidate.label == other.candidate.label && self.baseline.label == other.baseline.label
+    }
+
     /// (candidate, baseline) per seed, as positions among a sequence's variants; a row without seeds is compared with every one
     /// of the other's.
     fn members(self) -> Vec<(usize, usize)> {

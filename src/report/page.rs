@@ -41,7 +41,7 @@ fn given_avatar(recipe: &AvatarRecipe) -> Option<String> {
 
 /// The command that makes these tables again, from the same data.
 pub(super) fn command(results: &Results) -> String {
-    let Options { profile, subset, lpips_weights } = &results.options;
+    let Options { profile, subset, lpips_weights, seeds } = &results.options;
     let mut words = vec!["reproduce run".to_owned()];
     words.extend(results.tables.iter().map(|table| table.experiment.clone()));
     words.push(format!("--profile {}", profile.id));
@@ -54,6 +54,9 @@ pub(super) fn command(results: &Results) -> String {
     let usual = Profile::preset(&profile.id).and_then(|preset| preset.fit_iterations);
     if let Some(iterations) = profile.fit_iterations.filter(|_| profile.fit_iterations != usual) {
         words.push(format!("--fit-iterations {iterations}"));
+    }
+    if !seeds.is_empty() {
+        words.push(format!("--seeds {}", seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(",")));
     }
     if let Some(given) = lpips_weights {
         words.push(format!("--lpips-weights lpips_{}.safetensors", given.net.id()));

@@ -12,6 +12,13 @@ pub(super) struct Group {
 }
 
 impl Group {
+    /// Whether an id names one of the members, or the variant that they repeat.
+    pub(super) fn is_called(&self, id: &str, experiment: &Experiment, variants: &[VariantResults]) -> bool {
+        let named =
+            |&member: &usize| experiment.variant(&variants[member].id).is_some_and(|v| v.is_called(id));
+        self.members.iter().any(named)
+    }
+
     /// The members on a sequence.
     pub(super) fn on<'a>(&self, sequence: &'a SequenceResults) -> Vec<&'a VariantResults> {
         self.members.iter().map(|&v| &sequence.variants[v]).collect()

@@ -271,6 +271,11 @@ fn wrong_files_are_refused_by_name_and_key() {
             "baseline = \"m\"",
             "baseline: `m`; expected the id of one of the variants",
         ),
+        (
+            "id = \"quaternions\"",
+            "against = [\"m\"]\nid = \"quaternions\"",
+            "variants[1].against: `m`; expected ids of variants",
+        ),
         ("id = \"quaternions\"", "id = \"matrices\"", "variants.id: `matrices` twice"),
         ("label = \"Quaternions\"", "label = \"Matrices\"", "variants.label: `Matrices` twice"),
         ("label = \"Mean\"", "label = \"anna\"", "sequences, average.label: `anna` twice"),
@@ -320,6 +325,8 @@ fn seeds_repeat_every_fit() {
     let ids: Vec<&str> = seeded.variants.iter().map(|v| v.id.as_str()).collect();
     assert_eq!(ids, ["matrices-4", "quaternions-4", "matrices-7", "quaternions-7"]);
     assert_eq!(seeded.baseline, "matrices-4");
+    let called = |id: &str| seeded.variants.iter().filter(|v| v.is_called(id)).count();
+    assert_eq!([called("matrices"), called("matrices-7"), called("mat")], [2, 1, 0]);
     let seed = |v: &Variant| match v.avatar {
         AvatarRecipe::Fit { seed, .. } => seed,
         _ => panic!("{}", v.id),

@@ -32,7 +32,12 @@ pub(super) fn wide_table_7() -> Experiment {
 }
 
 pub(super) fn options() -> Options {
-    Options { profile: Profile::standard(), subset: Subset::default(), lpips_weights: None }
+    Options {
+        profile: Profile::standard(),
+        subset: Subset::default(),
+        lpips_weights: None,
+        seeds: Vec::new(),
+    }
 }
 
 pub(super) fn sequence(id: &str, role: Role, frames: usize) -> SequenceInfo {

@@ -3,7 +3,7 @@
 use super::made_up::{
     figures, fitted_table_7, options, results, run, score, scored, table, table_7, with_holes,
 };
-use skinsplat::experiment::{Experiment, Records, Source, plan};
+use skinsplat::experiment::{Experiment, Records, Source, Variant, plan};
 use skinsplat::report::{self, Results, TableResults};
 use skinsplat_metrics::MetricId;
 use skinsplat_table::{Content, Row, RowKind, csv, markdown};
@@ -198,4 +198,37 @@ fn seeds_are_one_row_with_a_spread() {
     assert!(markdown.contains("+2.000 ± 1.414 over seeds"), "{markdown}");
     assert!(markdown.contains("over the seeds 0, 1"), "{markdown}");
     assert!(csv(&table.table).lines().next().unwrap().contains("psnr sd"));
+}
+
+/// PSNR 30, 31 and 33 dB of three variants, the third compared with the second too.
+#[test]
+fn a_variant_is_compared_with_what_it_asks_for() {
+    let mut experiment = table_7();
+    let third = Variant {
+        id: "third".into(),
+        label: "Third".into(),
+        paper: None,
+        strategy: Some("view-canonical".into()),
+        against: vec!["quaternions".into(), "matrices".into(), "third".into()],
+        ..experiment.variants[1].clone()
+    };
+    experiment.variants.push(third);
+    let table = table(&experiment, |plan| {
+        let mut records = Records::new();
+        for job in &plan.jobs {
+            for (variant, psnr) in job.variants.iter().zip([30.0, 31.0, 33.0]) {
+                records.insert(
+                    variant.key.clone(),
+                    scored(&variant.key, score(&job.protocol.id, psnr, 0.9, None)),
+                );
+            }
+        }
+        records
+    });
+    let over_all = table.comparisons.iter().filter(|c| c.sequence.is_none());
+    let psnr = |c: &skinsplat::report::Comparison| c.differences[0].estimate.unwrap().mean;
+    let compared: Vec<_> = over_all.map(|c| (c.variant.as_str(), c.baseline.as_str(), psnr(c))).collect();
+    let each_once =
+        [("Quaternions", "Matrices", 1.0), ("Third", "Matrices", 3.0), ("Third", "Quaternions", 2.0)];
+    assert_eq!(compared, each_once);
 }
