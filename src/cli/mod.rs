@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand, progress, exit codes.
 
+mod batch;
 mod blend;
 mod check;
 mod compare;
@@ -13,12 +14,15 @@ mod fit;
 mod inspect;
 mod list;
 mod lpips;
+mod merge;
 mod output;
 mod page;
 mod plan;
 mod planning;
 mod posing;
+mod products;
 mod progress;
+mod quoting;
 mod render;
 mod report;
 mod run;
@@ -57,6 +61,8 @@ pub(crate) struct Cli {
 enum Command {
     Run(run::Run),
     Plan(plan::Plan),
+    Merge(merge::Merge),
+    Batch(batch::Batch),
     Report(report::Report),
     Compare(compare::Compare),
     List(list::List),
@@ -142,6 +148,8 @@ impl Command {
         match self {
             Self::Run(command) => command.run(context),
             Self::Plan(command) => command.run(),
+            Self::Merge(command) => command.run(context),
+            Self::Batch(command) => command.run(),
             Self::Report(command) => command.run(context),
             Self::Compare(command) => command.run(context),
             Self::List(command) => command.run(),

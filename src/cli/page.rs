@@ -1,7 +1,6 @@
 //! The page of a run: what `run --html` and `report --format html` write.
 
 use super::Context;
-use super::run::stores;
 use anyhow::{Context as _, Result};
 use image::RgbImage;
 use skinsplat::report::Results;
@@ -49,7 +48,7 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images) -> Result<S
         }
         false => String::new(),
     };
-    let records = store::merge(stores(folder)?.iter().map(std::path::PathBuf::as_path))?;
+    let records = store::merge(store::stores(folder)?.iter().map(std::path::PathBuf::as_path))?;
     let tables = timing::costs(results, &records).into_iter().collect();
     let extras = Extras { pictures: kept(folder, images)?, curves, tables, bound: BOUND };
     Ok(html(results, &extras))

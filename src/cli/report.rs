@@ -3,7 +3,6 @@
 use super::compare::{Comparing, folder, load};
 use super::output::{emit, written};
 use super::page::{Images, page, write_page};
-use super::run::stores;
 use super::selection::read_json;
 use super::{Context, Exit};
 use anyhow::{Result, anyhow};
@@ -85,7 +84,7 @@ impl Report {
     }
 
     fn timing(&self, results: &Results) -> Result<String> {
-        let records = store::merge(stores(folder(&self.run))?.iter().map(PathBuf::as_path))?;
+        let records = store::merge(store::stores(folder(&self.run))?.iter().map(PathBuf::as_path))?;
         let mut tables = vec![report::timing::phases(results, &records)];
         let path = folder(&self.run).join("run.json");
         if path.is_file() {

@@ -272,6 +272,7 @@ pub enum AvatarRecipe {
     /// `splats`, `bytes` and `milliseconds`.
     Renders {
         /// The folder; `{subject}` and `{sequence}` stand for their ids. Relative to the experiment's file.
+        #[serde(serialize_with = "super::lossy::path")]
         path: PathBuf,
     },
 }

@@ -27,6 +27,7 @@ mod foreign_images;
 mod inspecting;
 mod lpips;
 mod made_up;
+mod merging;
 mod motion;
 mod needs;
 mod other_formats;
