@@ -164,7 +164,7 @@ impl Slurm {
             ),
         ];
         let merge = [
-            format!("--job-name={name}-merge --dependency=afterany:\"$array\" --cpus-per-task=1"),
+            format!("--job-name={name}-merge --dependency=afterany:\"${{array%%;*}}\" --cpus-per-task=1"),
             format!(
                 "{} {}{further}",
                 with("mem", OsStr::new(&self.mem)),

@@ -1,6 +1,6 @@
 //! `reproduce compare`: a run against an earlier one, or against the paper.
 
-use super::output::{emit, written};
+use super::output::{emit, save, written};
 use super::page::PICTURES;
 use super::tolerances::ToleranceOptions;
 use super::{Context, Exit};
@@ -9,9 +9,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use skinsplat::report::compare::{self, Changes, Fate, Tolerances, Verdict};
 use skinsplat::report::{Results, picture_name};
 use skinsplat::run::pictures::single_picture;
-use skinsplat_data::atomic;
 use skinsplat_table::{FORMATS, to_json};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Compare a run with an earlier one: what regressed, improved, is missing or new.
@@ -119,7 +117,7 @@ impl Compare {
         // Written before the verdict ends the program: a report of a failure is what they are for.
         for Saving { format, file } in &self.save {
             let text = self.how.written(&changes, format);
-            atomic::write(file, |w| w.write_all(text.as_bytes()))?;
+            save(file, &text)?;
         }
         self.how.print(&changes, &self.format, context)
     }
@@ -162,8 +160,8 @@ impl Comparing {
     fn tolerances(&self) -> Result<Tolerances> {
         let asked = self.asked.0.clone();
         let Some(path) = &self.tolerances else { return Ok(Tolerances { asked, ..Tolerances::default() }) };
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("{}: cannot read", path.display()))?;
+        let text = skinsplat_data::source::read_to_string(path)
+            .with_context(|| format!("{}: cannot read", path.display()))?;
         let file = Tolerances::parse(&text).map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
         Ok(Tolerances { asked, ..file })
     }
@@ -215,6 +213,7 @@ pub(super) fn folder(run: &Path) -> &Path {
 /// A file that cannot be read or is none; the message names the file.
 pub(super) fn load(path: &Path) -> Result<Results> {
     let file = if path.is_dir() { path.join("results.json") } else { path.to_owned() };
-    let text = std::fs::read_to_string(&file).with_context(|| format!("{}: cannot read", file.display()))?;
+    let text = skinsplat_data::source::read_to_string(&file)
+        .with_context(|| format!("{}: cannot read", file.display()))?;
     Results::from_json(&text).map_err(|problem| anyhow!("{}: {problem}", file.display()))
 }

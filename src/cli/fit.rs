@@ -60,6 +60,12 @@ Examples:
   reproduce render ava.ply --body BODY --poses POSES --frame 0 --camera CAMERA.json --out ava.png";
 
 impl Fit {
+    /// How to go on after the fit was stopped.
+    pub(super) fn advice(&self) -> String {
+        let checkpoint = self.out.with_extension("checkpoint");
+        format!("the same command goes on from {}, if there is one yet", checkpoint.display())
+    }
+
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         if self.out.extension().is_none_or(|extension| extension != "ply") {
             bail!("--out {}: expected a name that ends in .ply", self.out.display());

@@ -12,6 +12,7 @@ mod export;
 mod fetch_help;
 mod fit;
 mod inspect;
+mod interrupt;
 mod list;
 mod lpips;
 mod merge;
@@ -36,6 +37,7 @@ mod trade;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use exit::Exit;
+use output::say;
 use std::ffi::OsString;
 
 /// How should a Gaussian rotate on a skinned body?
@@ -89,10 +91,9 @@ struct Context {
 
 impl Context {
     /// A note for the person at the terminal, on standard error.
-    #[allow(clippy::print_stderr, reason = "the one place that writes notes")]
     fn note(&self, text: impl std::fmt::Display) {
         if !self.quiet {
-            eprintln!("{text}");
+            say(text);
         }
     }
 }
@@ -106,10 +107,10 @@ pub(crate) fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     let result = skinsplat_simd::level()
         .map_err(anyhow::Error::from)
         .and_then(|_| set_threads(cli.threads))
+        .and_then(|()| Ok(interrupt::listen(cli.command.advice())?))
         .and_then(|()| cli.command.run(Context { quiet: cli.quiet }));
     match result {
         Ok(exit) => exit,
-        Err(error) if output::is_broken_pipe(&error) => Exit::Success,
         Err(error) => {
             report_error(&one_line(&format!("{error:#}")));
             Exit::Unusable
@@ -131,9 +132,8 @@ fn answered(error: &clap::Error) -> Exit {
     Exit::Unusable
 }
 
-#[allow(clippy::print_stderr, reason = "the one place that writes errors")]
 fn report_error(text: &str) {
-    eprintln!("error: {text}");
+    say(format_args!("error: {text}"));
 }
 
 /// One line, whatever the messages of the libraries below look like and whatever names are in them: a terminal obeys no
@@ -144,6 +144,15 @@ fn one_line(text: &str) -> String {
 }
 
 impl Command {
+    /// How to go on after the command was stopped.
+    fn advice(&self) -> String {
+        match self {
+            Self::Run(command) => command.advice(),
+            Self::Fit(command) => command.advice(),
+            _ => "nothing is left half written; the same command starts anew".to_owned(),
+        }
+    }
+
     fn run(&self, context: Context) -> anyhow::Result<Exit> {
         match self {
             Self::Run(command) => command.run(context),

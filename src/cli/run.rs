@@ -8,13 +8,13 @@ use super::{Context, Exit, progress::Watch};
 use anyhow::{Context as _, Result};
 use skinsplat::experiment::{Records, Shard, Unreadable};
 use skinsplat::report;
-use skinsplat::run::gallery;
 use skinsplat::run::motion::{self, Motion};
 use skinsplat::run::pictures;
 use skinsplat::run::plan_file::{LeftOut, PlanFile};
 use skinsplat::run::provenance::{Provenance, Stopwatch};
 use skinsplat::run::store::{self, FILE_NAME, Store};
 use skinsplat::run::{self, Machine};
+use skinsplat::run::{cache, gallery};
 use skinsplat_data::atomic;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -57,9 +57,23 @@ pub(super) struct Run {
     /// Draw only every N-th pose of the motion
     #[arg(long, value_name = "N", requires = "motion", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     motion_every: u32,
+    /// What stays in the folder's avatars/ once every score is there: all, for pictures, motions and runs with other variants; or
+    /// none but the reports of fits, for small folders
+    #[arg(long, value_enum, value_name = "WHICH", default_value_t, conflicts_with = "shard")]
+    keep: KeepAvatars,
     /// Forget what the folder's results store knows
     #[arg(long, conflicts_with = "shard")]
     fresh: bool,
+}
+
+/// Which avatars stay.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+enum KeepAvatars {
+    /// All that were made
+    #[default]
+    All,
+    /// None
+    None,
 }
 
 const EXAMPLES: &str = "\
@@ -82,6 +96,11 @@ impl Run {
             ("--motion", self.motion.is_some()),
             ("--fresh", self.fresh),
         ]
+    }
+
+    /// How to go on after the run was stopped.
+    pub(super) fn advice(&self) -> String {
+        format!("what is done is kept in {}; the same command goes on from there", self.out.display())
     }
 
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
@@ -172,7 +191,13 @@ impl Run {
         if missing > 0 {
             context.note(format!("{missing} scores are missing; {out}/{FILE_NAME} says why"));
         }
-        Ok(verdict(&planned.plan, missing, &left_out(planned), context))
+        let exit = verdict(&planned.plan, missing, &left_out(planned), context);
+        if self.keep == KeepAvatars::None && exit == Exit::Success {
+            let made = planned.plan.avatars.iter().map(|avatar| avatar.key.as_str());
+            let starts = planned.plan.avatars.iter().filter_map(|avatar| avatar.start());
+            cache::remove_entries(&self.out.join(AVATARS), made.chain(starts))?;
+        }
+        Ok(exit)
     }
 }
 

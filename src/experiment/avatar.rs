@@ -121,6 +121,14 @@ impl PlannedAvatar {
         }
     }
 
+    /// The key of the avatar with which its fit starts; none if it is not fitted.
+    pub fn start(&self) -> Option<&str> {
+        match &self.source {
+            AvatarSource::Fit { fit, .. } => Some(&fit.start),
+            _ => None,
+        }
+    }
+
     /// What it is, for people: data set, subject and recipe.
     pub fn label(&self) -> String {
         let how = match &self.source {

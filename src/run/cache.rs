@@ -51,7 +51,7 @@ impl Entry {
 
     /// What is wrong with the entry, if anything is.
     fn damage(&self) -> Option<String> {
-        let Ok(sums) = std::fs::read_to_string(self.path(SUMS)) else {
+        let Ok(sums) = skinsplat_data::source::read_to_string(&self.path(SUMS)) else {
             return Some("no checksum".to_owned());
         };
         let differs = |extension: &&&str| {
@@ -85,6 +85,23 @@ impl Entry {
         Ok(found)
     }
 }
+
+/// Removes the entries of some keys, but for the reports of fits (`KEY.json`), which say how an avatar was made. Their checksums
+/// go first: what is left of an entry when this is interrupted does not count.
+///
+/// # Errors
+/// A file that cannot be removed.
+pub fn remove_entries<'a>(folder: &Path, keys: impl IntoIterator<Item = &'a str>) -> Result<(), Error> {
+    for key in keys {
+        for extension in [SUMS].iter().chain(&PARTS) {
+            remove(&folder.join(format!("{key}.{extension}")))?;
+        }
+    }
+    Ok(())
+}
+
+/// Extensions of what an avatar consists of, but for the report of a fit.
+const PARTS: [&str; 5] = ["ply", "npy", "vertices.npy", "texture.png", "poses.json"];
 
 /// Extension of the checksums.
 const SUMS: &str = "sha256";

@@ -54,7 +54,7 @@ pub fn curves(plan: &Plan, folders: &[PathBuf]) -> Result<Vec<Curve>, Error> {
             let name = format!("{}.json", variant.avatar);
             let found = folders.iter().map(|folder| folder.join(&name)).find(|path| path.is_file());
             let Some(path) = found else { continue };
-            let Ok(text) = std::fs::read_to_string(&path) else { continue };
+            let Ok(text) = skinsplat_data::source::read_to_string(&path) else { continue };
             let report: FitReport = serde_json::from_str(&text)
                 .map_err(|error| Error::Sidecar { path, problem: error.to_string() })?;
             curves.push(Curve {

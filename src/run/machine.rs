@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::path::Path;
 
 /// A machine, as far as a difference between two results could come from it. No result depends on it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -31,7 +32,7 @@ impl fmt::Display for Machine {
 
 fn host() -> Option<String> {
     let named = |variable: &str| std::env::var(variable).ok();
-    let of_system = || std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    let of_system = || skinsplat_data::source::read_to_string(Path::new("/proc/sys/kernel/hostname")).ok();
     let name = named("SLURMD_NODENAME").or_else(of_system).or_else(|| named("HOSTNAME"));
     let name = name.or_else(|| named("COMPUTERNAME"))?;
     Some(name.trim().to_owned()).filter(|name| !name.is_empty())
@@ -39,7 +40,7 @@ fn host() -> Option<String> {
 
 /// The processor as Linux names it.
 fn processor() -> Option<String> {
-    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let text = skinsplat_data::source::read_to_string(Path::new("/proc/cpuinfo")).ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;
     Some(line.split_once(':')?.1.trim().to_owned())
 }

@@ -89,7 +89,7 @@ impl PlanFile {
     /// A file that cannot be read, that is something else, or that was changed.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let invalid = |problem: String| Error::PlanFile { path: path.to_owned(), problem };
-        let bytes = std::fs::read(path).map_err(|source| Error::File {
+        let bytes = skinsplat_data::source::read(path).map_err(|source| Error::File {
             path: path.to_owned(),
             action: "read",
             source,

@@ -38,6 +38,7 @@ mod reports;
 mod robust_runs;
 mod scoring;
 mod scoring_inputs;
+mod streams;
 mod stressing;
 mod usage;
 mod widths;

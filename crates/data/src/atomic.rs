@@ -1,9 +1,12 @@
-//! Writing a file so that a reader sees all of it or none: beside the target, then renamed.
+//! Writing a file so that a reader sees all of it or none: beside the target, then renamed. A program that is told to stop calls
+//! [`abandon`], and leaves nothing half written.
 
 use super::Error;
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// How the names of files begin that are not complete yet.
@@ -58,10 +61,37 @@ fn beside(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let file = builder.tempfile_in(folder)?;
-    filled(file.as_file(), fill)?;
-    file.persist(path).map_err(|e| e.error)?;
-    Ok(())
+    let (file, name) = {
+        let mut unfinished = unfinished();
+        let file = builder.tempfile_in(folder)?;
+        let name = file.path().to_owned();
+        unfinished.insert(name.clone());
+        (file, name)
+    };
+    let written = filled(file.as_file(), fill).and_then(|()| {
+        let _unfinished = unfinished();
+        file.persist(path).map(|_| ()).map_err(|e| e.error)
+    });
+    unfinished().remove(&name);
+    written
+}
+
+/// Files of this process that are not complete yet.
+static UNFINISHED_FILES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED_FILES.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes every file that this process has not completed, and lets it begin and complete no other: for a process that ends
+/// while its threads are still writing. Keep what is returned until it does.
+pub fn abandon() -> impl Drop {
+    let unfinished = unfinished();
+    for path in unfinished.iter() {
+        // One that cannot be removed is swept later.
+        let _ = std::fs::remove_file(path);
+    }
+    unfinished
 }
 
 fn filled(file: &File, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
