@@ -10,18 +10,18 @@
 use super::{AvatarSource, Job, JobVariant, Plan, PlannedAvatar, Shard};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Estimated work, in pixels drawn and scored. An estimate of the proportions, from the times of runs (benches/README.md): no
-/// result depends on it.
+/// Estimated work, in pixels of a fit's iteration, about 31 ns of two cores each. The proportions are those of
+/// benches/README.md; no result depends on them.
 type Cost = u64;
 
-/// Pixels' worth of one iteration of a fit per pixel of its image: forth, back and the loss, without a perceptual metric.
+/// An iteration of a fit, per pixel of its image: forth, back and the loss, without a perceptual metric.
 const ITERATION_PER_PIXEL: Cost = 1;
-/// Pixels' worth of one iteration of a fit per Gaussian: posing, its adjoint and the step.
-const ITERATION_PER_SPLAT: Cost = 4;
-/// Pixels' worth of a frame per pixel: reading, drawing, scoring, LPIPS included.
-const FRAME_PER_PIXEL: Cost = 4;
-/// Pixels' worth of reading a file and binding its Gaussians.
-const READING: Cost = 200_000;
+/// An iteration of a fit, per Gaussian: posing, its adjoint and the step.
+const ITERATION_PER_SPLAT: Cost = 13;
+/// A frame, per pixel: reading, drawing, scoring, LPIPS included.
+const FRAME_PER_PIXEL: Cost = 13;
+/// Reading a file and binding its Gaussians.
+const READING: Cost = 1_000_000;
 /// Square millimetres of an adult's skin.
 const SKIN: u64 = 1_900_000;
 /// The longer side of an image whose size nobody said, pixels.
@@ -78,7 +78,7 @@ impl Slices {
         self.owner.get(key).copied()
     }
 
-    /// Estimated cost of each slice, in pixels drawn and scored.
+    /// Estimated cost of each slice, in pixels of a fit's iteration.
     pub fn loads(&self) -> &[u64] {
         &self.loads
     }
