@@ -81,7 +81,7 @@ fn memory_does_not_grow_with_the_number_of_frames() {
             *peak as f64 / 1e6
         );
     }
-    // Records and results are kept, a few kilobytes per frame; an image of 64 by 64 in f64 takes 98.
+    // Plan, records and results are kept, 10 kilobytes per frame; an image of 64 by 64 in f64 takes 98.
     let grown = large.peak.saturating_sub(small.peak);
-    assert!(grown < 8_000_000 + 8_000 * many as u64, "{grown} bytes more: {small:?} {large:?}");
+    assert!(grown < 8_000_000 + 12_000 * many as u64, "{grown} bytes more: {small:?} {large:?}");
 }

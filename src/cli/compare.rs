@@ -2,10 +2,11 @@
 
 use super::output::{emit, save, written};
 use super::page::PICTURES;
+use super::selection::name_and_path;
 use super::tolerances::ToleranceOptions;
 use super::{Context, Exit};
 use anyhow::{Context as _, Result, anyhow, bail};
-use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::builder::{OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use skinsplat::report::compare::{self, Changes, Fate, Tolerances, Verdict};
 use skinsplat::report::{Results, picture_name};
 use skinsplat::run::pictures::single_picture;
@@ -33,7 +34,7 @@ pub(super) struct Compare {
     #[arg(long, value_name = "FORMAT", value_parser = formats(), default_value = "text")]
     format: String,
     /// Also write it to a file (may be repeated)
-    #[arg(long, value_name = "FORMAT=FILE", value_parser = saving)]
+    #[arg(long, value_name = "FORMAT=FILE", value_parser = saving())]
     save: Vec<Saving>,
     /// Only these tables (may be repeated)
     #[arg(long = "table", value_name = "EXPERIMENT")]
@@ -89,14 +90,13 @@ fn formats() -> PossibleValuesParser {
     PossibleValuesParser::new(tables.chain(MORE).map(value).collect::<Vec<_>>())
 }
 
-fn saving(text: &str) -> Result<Saving, String> {
-    let known: Vec<&str> = FORMATS.iter().map(|format| format.id).chain(MORE.map(|(id, _)| id)).collect();
-    match text.split_once('=') {
-        Some((format, file)) if known.contains(&format) && !file.is_empty() => {
-            Ok(Saving { format: format.to_owned(), file: file.into() })
-        }
-        _ => Err(format!("expected FORMAT=FILE with a format of {}", known.join(", "))),
-    }
+fn saving() -> impl TypedValueParser<Value = Saving> {
+    OsStringValueParser::new().try_map(|text| {
+        let known: Vec<&str> = FORMATS.iter().map(|format| format.id).chain(MORE.map(|(id, _)| id)).collect();
+        let named = name_and_path(&text).filter(|(format, _)| known.contains(&format.as_str()));
+        let expected = || format!("expected FORMAT=FILE with a format of {}", known.join(", "));
+        named.map(|(format, file)| Saving { format, file }).ok_or_else(expected)
+    })
 }
 
 impl Compare {

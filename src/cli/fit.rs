@@ -9,7 +9,7 @@ use skinsplat::experiment::Profile;
 use skinsplat::run::fitting::{self, FitEvent, FitFiles, FitReport, Tests};
 use skinsplat::run::held_out::HeldOut;
 use skinsplat_data::select::evenly_spaced;
-use skinsplat_data::{Sequence, Subject};
+use skinsplat_data::{Sequence, Subject, atomic};
 use skinsplat_fit::FitOptions;
 use skinsplat_fit::Recipe;
 use std::path::PathBuf;
@@ -70,6 +70,7 @@ impl Fit {
         if self.out.extension().is_none_or(|extension| extension != "ply") {
             bail!("--out {}: expected a name that ends in .ply", self.out.display());
         }
+        atomic::check(&self.out)?;
         let recipe = Recipe::parse(&self.recipe)?;
         let (dataset, subject) = self.data.subject(&self.subject)?;
         let (training, tests) = self.sequences(&subject)?;

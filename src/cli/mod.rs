@@ -112,10 +112,22 @@ pub(crate) fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     match result {
         Ok(exit) => exit,
         Err(error) => {
-            report_error(&one_line(&format!("{error:#}")));
+            report_error(&one_line(&causes(&error)));
             Exit::Unusable
         }
     }
+}
+
+/// An error and its causes, each once: some texts hold those of their causes already.
+fn causes(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text += if text.is_empty() { "" } else { ": " };
+            text += &cause;
+        }
+    }
+    text
 }
 
 /// Help and versions as they are asked for; wrong usage as one line.

@@ -105,6 +105,7 @@ impl Run {
 
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let start = Instant::now();
+        self.html.iter().try_for_each(|path| atomic::check(path))?;
         let mut planned = self.planning.plan()?;
         let motion = self.motion(&mut planned, context)?;
         let mut provenance = Provenance::starting(&planned.plan);

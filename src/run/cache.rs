@@ -39,11 +39,11 @@ impl Entry {
     ) -> Result<(), Error> {
         match self.damage() {
             None => return Ok(()),
-            Some(damage) => {
-                if self.discard()? {
-                    say(format!("{}: {damage}; made again", self.path(self.extensions[0]).display()))?;
-                }
+            // Nothing is removed: another process may be making the same entry, bit for bit, and each file is replaced at once.
+            Some(damage) if self.is_there() => {
+                say(format!("{}: {damage}; made again", self.path(self.extensions[0]).display()))?;
             }
+            Some(_) => {}
         }
         make()?;
         self.seal()
@@ -76,13 +76,9 @@ impl Entry {
         Ok(format!("{}  {}.{extension}", file_digest(&self.path(extension))?, self.key))
     }
 
-    /// Removes what there is of the entry; true if there was something.
-    fn discard(&self) -> Result<bool, Error> {
-        let mut found = false;
-        for extension in self.extensions.iter().chain(&[SUMS]) {
-            found |= remove(&self.path(extension))?;
-        }
-        Ok(found)
+    /// True if there is something of the entry.
+    fn is_there(&self) -> bool {
+        self.extensions.iter().chain(&[SUMS]).any(|extension| self.path(extension).exists())
     }
 }
 

@@ -13,6 +13,7 @@
 use super::Machine;
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Records};
 use serde::{Deserialize, Serialize};
+use skinsplat_data::source;
 use std::collections::btree_map;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, Metadata, OpenOptions};
@@ -138,12 +139,14 @@ impl Store {
     pub fn open(path: &Path, plan: &str, machine: &Machine) -> Result<Self, Error> {
         let io = |source| Error::Io { path: path.into(), source };
         let mut file = OpenOptions::new().read(true).append(true).create(true).open(path).map_err(io)?;
+        let locked = Locked::of(&file);
         let bytes = whole(&mut file).map_err(io)?;
         let contents = parse(&bytes, path)?;
         let records = contents.records(path)?;
         if contents.whole < bytes.len() as u64 {
             cut(path, contents.whole).map_err(io)?;
         }
+        drop(locked);
         let mut store = Self { path: path.into(), file, records };
         if contents.plan.as_deref() != Some(plan) || *contents.machine != *machine {
             let (plan, machine) = (plan.into(), machine.clone());
@@ -190,12 +193,32 @@ impl Store {
             text.push('\n');
         }
         let io = |source| Error::Io { path: self.path.clone(), source };
+        let _locked = Locked::of(&self.file);
         let before = self.file.metadata().map_err(io)?.len();
         self.file.write_all(text.as_bytes()).and_then(|()| self.file.flush()).map_err(|source| {
             // Should even this fail, the next reader drops the torn line.
             let _ = cut(&self.path, before);
             io(source)
         })
+    }
+}
+
+/// A store that no other process changes meanwhile, where the file system has locks: the last line of another is then never
+/// taken for a torn one. Without them, appending in one write has to do.
+struct Locked(Option<File>);
+
+impl Locked {
+    fn of(file: &File) -> Self {
+        Self(file.try_clone().ok().filter(|file| file.lock().is_ok()))
+    }
+}
+
+impl Drop for Locked {
+    fn drop(&mut self) {
+        if let Some(file) = &self.0 {
+            // It ends with the file at the latest.
+            let _ = file.unlock();
+        }
     }
 }
 
@@ -232,9 +255,7 @@ pub fn read(path: &Path) -> Result<Records, Error> {
 /// # Errors
 /// If the file cannot be read or is not a store.
 pub fn read_all(path: &Path) -> Result<Contents, Error> {
-    // A pipe waits for a writer when it is opened.
-    let regular = std::fs::metadata(path).and_then(|metadata| refuse_devices(&metadata));
-    let bytes = regular.and_then(|()| whole(&mut File::open(path)?));
+    let bytes = source::open(path).and_then(|mut file| whole(&mut file));
     let bytes = bytes.map_err(|source| Error::Io { path: path.into(), source })?;
     parse(&bytes, path)
 }

@@ -48,11 +48,27 @@ pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result
     written.map_err(|cause| Error::write(path, "file", cause))
 }
 
-fn beside(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
-    let folder = match path.parent() {
+/// Finds out whether [`write`] could write there, before work is done that would be lost: nothing is left behind.
+///
+/// # Errors
+/// As [`write`], but for a disk that fills up.
+pub fn check(path: &Path) -> Result<(), Error> {
+    let tried = match std::fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => Err(io::Error::from(io::ErrorKind::IsADirectory)),
+        Ok(metadata) if !metadata.is_file() => Ok(()),
+        _ => tempfile::Builder::new().prefix(UNFINISHED).tempfile_in(folder_of(path)).map(|_| ()),
+    };
+    tried.map_err(|cause| Error::write(path, "file", cause))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
-    };
+    }
+}
+
+fn beside(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(UNFINISHED);
     #[cfg(unix)]
@@ -63,7 +79,7 @@ fn beside(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()
     }
     let (file, name) = {
         let mut unfinished = unfinished();
-        let file = builder.tempfile_in(folder)?;
+        let file = builder.tempfile_in(folder_of(path))?;
         let name = file.path().to_owned();
         unfinished.insert(name.clone());
         (file, name)
@@ -138,6 +154,16 @@ mod tests {
         sweep(&folder.path().join("missing"));
         let left = |name| folder.path().join(name).exists();
         assert_eq!([left(".writing-a"), left(".writing-b"), left("kept")], [false, true, true]);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_known_before() {
+        let folder = tempfile::tempdir().unwrap();
+        for path in [folder.path().join("missing/out.bin"), folder.path().to_path_buf()] {
+            assert!(matches!(check(&path), Err(Error::Write { .. })));
+        }
+        check(&folder.path().join("out.bin")).unwrap();
+        assert_eq!(entries(folder.path()), 0);
     }
 
     #[test]
