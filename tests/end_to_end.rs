@@ -136,22 +136,59 @@ fn a_killed_run_goes_on_where_it_stopped() {
     );
 }
 
-#[test]
-fn shards_collect_to_the_same_tables() {
-    let desk = desk();
-    run(&desk, "whole", &[]);
-    for shard in ["1/3", "2/3", "3/3"] {
-        let answer = run(&desk, "shards", &["--shard", shard]);
-        assert_eq!(answer.out, "");
-        assert!(!desk.path("shards/results.json").exists());
+/// What a run leaves for its reader: everything but what it works with.
+fn shown(desk: &Desk, out: &str) -> Vec<(String, Vec<u8>)> {
+    let works_with = |name: &str| name.starts_with("avatars") || name.starts_with("plan-");
+    products(desk, out).into_iter().filter(|(name, _)| !works_with(name)).collect()
+}
+
+fn assert_same_tables(desk: &Desk, a: &str, b: &str) {
+    let [a, b] = [a, b].map(|out| shown(desk, out));
+    let names = |files: &[(String, Vec<u8>)]| files.iter().map(|f| f.0.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&a), names(&b));
+    for ((name, a), (_, b)) in a.iter().zip(&b) {
+        assert!(a == b, "{name} differs");
     }
-    run(&desk, "shards", &[]);
-    assert_eq!(rendered(&desk, "shards"), 0);
-    assert_equal(&desk, "whole", "shards");
-    let stores = [1, 2, 3].map(|i| desk.read(&format!("shards/shard-0{i}-of-03.jsonl")));
-    let keys: Vec<String> = stores.iter().flat_map(|store| keys(store)).collect();
+}
+
+#[test]
+fn shards_merge_to_the_same_tables() {
+    let desk = desk();
+    // A fit besides, whose way is drawn too.
+    desk.put(
+        "tiny.toml",
+        TABLE.replacen("surface-vertex\" }", "fit\", name = \"hugs-skinned\" }", 1).replacen(
+            "sh_degree = 1\n",
+            "",
+            1,
+        ),
+    );
+    let more = ["--fit-iterations", "2", "--limit", "3"];
+    let whole = run(&desk, "whole", &more);
+    for shard in ["1/3", "2/3", "3/3"] {
+        let own = format!("own-{}", &shard[..1]);
+        for out in ["shared", &own] {
+            let answer = run(&desk, out, &[&more[..], &["--shard", shard]].concat());
+            assert_eq!(answer.out, "");
+            assert!(!desk.path(out).join("results.json").exists());
+        }
+    }
+    let keys: Vec<String> =
+        [1, 2, 3].iter().flat_map(|i| keys(&desk.read(&format!("shared/shard-0{i}-of-03.jsonl")))).collect();
     assert_nothing_twice(&keys);
-    assert_eq!(keys.len(), 12);
+    // From one folder into itself, and from three into a fourth, without data and experiment.
+    std::fs::remove_file(desk.path("tiny.toml")).unwrap();
+    assert_eq!(desk.ok(args!["merge", "shared"]), whole.out);
+    assert_same_tables(&desk, "whole", "shared");
+    for again in 0..2 {
+        let merged = desk.ok(args!["merge", "own-1", "own-2", "own-3", "--out", "merged"]);
+        assert_eq!(merged, whole.out, "{again}");
+    }
+    assert!(desk.path("merged/curves.csv").is_file());
+    assert_same_tables(&desk, "whole", "merged");
+    // The folder is a run's: nothing is left to do.
+    assert_eq!(desk.ok(args!["report", "merged"]), whole.out);
+    desk.ok(args!["report", "merged", "--timing"]);
 }
 
 #[test]

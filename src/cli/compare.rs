@@ -1,17 +1,16 @@
 //! `reproduce compare`: a run against an earlier one, or against the paper.
 
-use super::output::{emit, written};
+use super::output::{emit, save, written};
 use super::page::PICTURES;
+use super::selection::name_and_path;
 use super::tolerances::ToleranceOptions;
 use super::{Context, Exit};
 use anyhow::{Context as _, Result, anyhow, bail};
-use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::builder::{OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use skinsplat::report::compare::{self, Changes, Fate, Tolerances, Verdict};
 use skinsplat::report::{Results, picture_name};
 use skinsplat::run::pictures::single_picture;
-use skinsplat_data::atomic;
 use skinsplat_table::{FORMATS, to_json};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Compare a run with an earlier one: what regressed, improved, is missing or new.
@@ -35,7 +34,7 @@ pub(super) struct Compare {
     #[arg(long, value_name = "FORMAT", value_parser = formats(), default_value = "text")]
     format: String,
     /// Also write it to a file (may be repeated)
-    #[arg(long, value_name = "FORMAT=FILE", value_parser = saving)]
+    #[arg(long, value_name = "FORMAT=FILE", value_parser = saving())]
     save: Vec<Saving>,
     /// Only these tables (may be repeated)
     #[arg(long = "table", value_name = "EXPERIMENT")]
@@ -91,14 +90,13 @@ fn formats() -> PossibleValuesParser {
     PossibleValuesParser::new(tables.chain(MORE).map(value).collect::<Vec<_>>())
 }
 
-fn saving(text: &str) -> Result<Saving, String> {
-    let known: Vec<&str> = FORMATS.iter().map(|format| format.id).chain(MORE.map(|(id, _)| id)).collect();
-    match text.split_once('=') {
-        Some((format, file)) if known.contains(&format) && !file.is_empty() => {
-            Ok(Saving { format: format.to_owned(), file: file.into() })
-        }
-        _ => Err(format!("expected FORMAT=FILE with a format of {}", known.join(", "))),
-    }
+fn saving() -> impl TypedValueParser<Value = Saving> {
+    OsStringValueParser::new().try_map(|text| {
+        let known: Vec<&str> = FORMATS.iter().map(|format| format.id).chain(MORE.map(|(id, _)| id)).collect();
+        let named = name_and_path(&text).filter(|(format, _)| known.contains(&format.as_str()));
+        let expected = || format!("expected FORMAT=FILE with a format of {}", known.join(", "));
+        named.map(|(format, file)| Saving { format, file }).ok_or_else(expected)
+    })
 }
 
 impl Compare {
@@ -119,7 +117,7 @@ impl Compare {
         // Written before the verdict ends the program: a report of a failure is what they are for.
         for Saving { format, file } in &self.save {
             let text = self.how.written(&changes, format);
-            atomic::write(file, |w| w.write_all(text.as_bytes()))?;
+            save(file, &text)?;
         }
         self.how.print(&changes, &self.format, context)
     }
@@ -162,8 +160,8 @@ impl Comparing {
     fn tolerances(&self) -> Result<Tolerances> {
         let asked = self.asked.0.clone();
         let Some(path) = &self.tolerances else { return Ok(Tolerances { asked, ..Tolerances::default() }) };
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("{}: cannot read", path.display()))?;
+        let text = skinsplat_data::source::read_to_string(path)
+            .with_context(|| format!("{}: cannot read", path.display()))?;
         let file = Tolerances::parse(&text).map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
         Ok(Tolerances { asked, ..file })
     }
@@ -215,6 +213,7 @@ pub(super) fn folder(run: &Path) -> &Path {
 /// A file that cannot be read or is none; the message names the file.
 pub(super) fn load(path: &Path) -> Result<Results> {
     let file = if path.is_dir() { path.join("results.json") } else { path.to_owned() };
-    let text = std::fs::read_to_string(&file).with_context(|| format!("{}: cannot read", file.display()))?;
+    let text = skinsplat_data::source::read_to_string(&file)
+        .with_context(|| format!("{}: cannot read", file.display()))?;
     Results::from_json(&text).map_err(|problem| anyhow!("{}: {problem}", file.display()))
 }

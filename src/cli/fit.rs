@@ -9,7 +9,7 @@ use skinsplat::experiment::Profile;
 use skinsplat::run::fitting::{self, FitEvent, FitFiles, FitReport, Tests};
 use skinsplat::run::held_out::HeldOut;
 use skinsplat_data::select::evenly_spaced;
-use skinsplat_data::{Sequence, Subject};
+use skinsplat_data::{Sequence, Subject, atomic};
 use skinsplat_fit::FitOptions;
 use skinsplat_fit::Recipe;
 use std::path::PathBuf;
@@ -60,10 +60,17 @@ Examples:
   reproduce render ava.ply --body BODY --poses POSES --frame 0 --camera CAMERA.json --out ava.png";
 
 impl Fit {
+    /// How to go on after the fit was stopped.
+    pub(super) fn advice(&self) -> String {
+        let checkpoint = self.out.with_extension("checkpoint");
+        format!("the same command goes on from {}, if there is one yet", checkpoint.display())
+    }
+
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         if self.out.extension().is_none_or(|extension| extension != "ply") {
             bail!("--out {}: expected a name that ends in .ply", self.out.display());
         }
+        atomic::check(&self.out)?;
         let recipe = Recipe::parse(&self.recipe)?;
         let (dataset, subject) = self.data.subject(&self.subject)?;
         let (training, tests) = self.sequences(&subject)?;

@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand, progress, exit codes.
 
+mod batch;
 mod blend;
 mod check;
 mod compare;
@@ -11,14 +12,18 @@ mod export;
 mod fetch_help;
 mod fit;
 mod inspect;
+mod interrupt;
 mod list;
 mod lpips;
+mod merge;
 mod output;
 mod page;
 mod plan;
 mod planning;
 mod posing;
+mod products;
 mod progress;
+mod quoting;
 mod render;
 mod report;
 mod run;
@@ -32,6 +37,7 @@ mod trade;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use exit::Exit;
+use output::say;
 use std::ffi::OsString;
 
 /// How should a Gaussian rotate on a skinned body?
@@ -57,6 +63,8 @@ pub(crate) struct Cli {
 enum Command {
     Run(run::Run),
     Plan(plan::Plan),
+    Merge(merge::Merge),
+    Batch(batch::Batch),
     Report(report::Report),
     Compare(compare::Compare),
     List(list::List),
@@ -83,10 +91,9 @@ struct Context {
 
 impl Context {
     /// A note for the person at the terminal, on standard error.
-    #[allow(clippy::print_stderr, reason = "the one place that writes notes")]
     fn note(&self, text: impl std::fmt::Display) {
         if !self.quiet {
-            eprintln!("{text}");
+            say(text);
         }
     }
 }
@@ -100,15 +107,27 @@ pub(crate) fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     let result = skinsplat_simd::level()
         .map_err(anyhow::Error::from)
         .and_then(|_| set_threads(cli.threads))
+        .and_then(|()| Ok(interrupt::listen(cli.command.advice())?))
         .and_then(|()| cli.command.run(Context { quiet: cli.quiet }));
     match result {
         Ok(exit) => exit,
-        Err(error) if output::is_broken_pipe(&error) => Exit::Success,
         Err(error) => {
-            report_error(&one_line(&format!("{error:#}")));
+            report_error(&one_line(&causes(&error)));
             Exit::Unusable
         }
     }
+}
+
+/// An error and its causes, each once: some texts hold those of their causes already.
+fn causes(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text += if text.is_empty() { "" } else { ": " };
+            text += &cause;
+        }
+    }
+    text
 }
 
 /// Help and versions as they are asked for; wrong usage as one line.
@@ -125,9 +144,8 @@ fn answered(error: &clap::Error) -> Exit {
     Exit::Unusable
 }
 
-#[allow(clippy::print_stderr, reason = "the one place that writes errors")]
 fn report_error(text: &str) {
-    eprintln!("error: {text}");
+    say(format_args!("error: {text}"));
 }
 
 /// One line, whatever the messages of the libraries below look like and whatever names are in them: a terminal obeys no
@@ -138,10 +156,21 @@ fn one_line(text: &str) -> String {
 }
 
 impl Command {
+    /// How to go on after the command was stopped.
+    fn advice(&self) -> String {
+        match self {
+            Self::Run(command) => command.advice(),
+            Self::Fit(command) => command.advice(),
+            _ => "nothing is left half written; the same command starts anew".to_owned(),
+        }
+    }
+
     fn run(&self, context: Context) -> anyhow::Result<Exit> {
         match self {
             Self::Run(command) => command.run(context),
             Self::Plan(command) => command.run(),
+            Self::Merge(command) => command.run(context),
+            Self::Batch(command) => command.run(),
             Self::Report(command) => command.run(context),
             Self::Compare(command) => command.run(context),
             Self::List(command) => command.run(),

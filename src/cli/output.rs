@@ -1,26 +1,45 @@
-//! Standard output: written in one place, so that a closed pipe (`| head`) ends the program quietly.
+//! Standard output and error: written in one place, so that a closed pipe (`| head`) neither ends the program nor changes how
+//! it ends: what was found out counts, whoever reads it.
 
 use anyhow::{Context as _, Result};
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use skinsplat_data::atomic;
 use skinsplat_table::{FORMATS, Format as TableFormat, Table, to_json};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
 
-/// Writes text to standard output.
+/// Writes text to standard output, unless its reader went away.
 ///
 /// # Errors
-/// As the pipe or file behind it; a broken pipe is recognised by [`is_broken_pipe`].
+/// As the file behind it, such as a full disk's.
 pub(super) fn emit(text: &str) -> Result<()> {
     // Names and comments are whatever files say: a terminal obeys none of them.
     let commands = |c: char| c.is_control() && c != '\n' && c != '\t';
     let text = text.replace(commands, "\u{fffd}");
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).context("standard output: cannot write")
+    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match written {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.context("standard output: cannot write"),
+    }
 }
 
-/// True if the reader of our output went away, which is no error.
-pub(super) fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    let broken = |e: &std::io::Error| e.kind() == std::io::ErrorKind::BrokenPipe;
-    error.chain().any(|cause| cause.downcast_ref::<std::io::Error>().is_some_and(broken))
+/// Writes text to a file that the arguments name; one that is a pipe whose reader went away is no error.
+///
+/// # Errors
+/// As [`atomic::write`].
+pub(super) fn save(path: &Path, text: &str) -> Result<()> {
+    match atomic::write(path, |w| w.write_all(text.as_bytes())) {
+        Err(skinsplat_data::Error::Write { cause, .. }) if cause.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => Ok(written?),
+    }
+}
+
+/// Writes a line to standard error. Where nobody reads it, there is nobody to be told.
+pub(super) fn say(line: impl std::fmt::Display) {
+    // Names are whatever files say: a terminal obeys none of them.
+    let line = line.to_string().replace(char::is_control, "\u{fffd}");
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
 /// How a command prints what it found.

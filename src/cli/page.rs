@@ -1,7 +1,6 @@
 //! The page of a run: what `run --html` and `report --format html` write.
 
 use super::Context;
-use super::run::stores;
 use anyhow::{Context as _, Result};
 use image::RgbImage;
 use skinsplat::report::Results;
@@ -44,12 +43,11 @@ pub(super) const PICTURES: &str = "pictures";
 pub(super) fn page(results: &Results, folder: &Path, images: Images) -> Result<String> {
     let curves = folder.join("curves.csv");
     let curves = match curves.is_file() {
-        true => {
-            std::fs::read_to_string(&curves).with_context(|| format!("{}: cannot read", curves.display()))?
-        }
+        true => skinsplat_data::source::read_to_string(&curves)
+            .with_context(|| format!("{}: cannot read", curves.display()))?,
         false => String::new(),
     };
-    let records = store::merge(stores(folder)?.iter().map(std::path::PathBuf::as_path))?;
+    let records = store::merge(store::stores(folder)?.iter().map(std::path::PathBuf::as_path))?;
     let tables = timing::costs(results, &records).into_iter().collect();
     let extras = Extras { pictures: kept(folder, images)?, curves, tables, bound: BOUND };
     Ok(html(results, &extras))
@@ -80,7 +78,9 @@ fn kept(folder: &Path, images: Images) -> Result<KeptPictures> {
 fn still(folder: &Path, kept: &Kept) -> Result<Stills> {
     let read = |file: &String| -> Result<RgbImage> {
         let path = folder.join(file);
-        Ok(image::open(&path)
+        let bytes = skinsplat_data::source::read(&path)
+            .with_context(|| format!("{}: cannot read", path.display()))?;
+        Ok(image::load_from_memory(&bytes)
             .with_context(|| format!("{}: cannot read the picture", path.display()))?
             .to_rgb8())
     };
@@ -97,7 +97,8 @@ fn still(folder: &Path, kept: &Kept) -> Result<Stills> {
 
 fn moving(folder: &Path, of: &Moving) -> Result<MovingPicture> {
     let path = folder.join(&of.file);
-    let gif = std::fs::read(&path).with_context(|| format!("{}: cannot read", path.display()))?;
+    let gif =
+        skinsplat_data::source::read(&path).with_context(|| format!("{}: cannot read", path.display()))?;
     // Width and height are the first words after the signature.
     let word = |at: usize| gif.get(at..at + 2).map_or(1, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
     let size = [word(6), word(8)];

@@ -4,7 +4,7 @@ use super::Exit;
 use super::output::{Format, emit, emit_json};
 use super::planning::{Planned, Planning};
 use anyhow::Result;
-use skinsplat::experiment::{self, Shard};
+use skinsplat::experiment::{self, Shard, Slices};
 use skinsplat::run::store;
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub(super) struct Plan {
     /// Folder of the run
     #[arg(long, value_name = "DIR", default_value = super::run::DEFAULT_OUT)]
     out: PathBuf,
-    /// Only this slice of the frames
+    /// Only this slice of the work
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// How to print the plan; JSON holds every avatar and every frame with its content key
@@ -50,11 +50,22 @@ impl Plan {
                 if names.is_empty() { "no data".to_owned() } else { names.join(", ") },
             );
         }
-        let records = store::merge(super::run::stores(&self.out)?.iter().map(PathBuf::as_path))?;
+        text += &self.shard.map_or_else(String::new, |shard| share(plan, shard));
+        let records = store::merge(store::stores(&self.out)?.iter().map(PathBuf::as_path))?;
         let jobs = plan.shard(self.shard);
-        let left = store::outstanding(jobs.iter().copied(), &records).len();
+        let left = store::outstanding(&jobs, &records).len();
         text +=
             &format!("{} avatars\n{} frames, {left} of them still to do\n", plan.avatars.len(), jobs.len());
         Ok(text)
     }
+}
+
+/// How much of the work a slice is, and how much of it nobody can cut any further.
+fn share(plan: &experiment::Plan, shard: Shard) -> String {
+    let slices = Slices::of(plan, shard.count());
+    let all = slices.loads().iter().sum::<u64>().max(1);
+    let percent = |cost: u64| cost * 100 / all;
+    let own = slices.loads().get(shard.index() - 1).copied().unwrap_or_default();
+    let piece = percent(slices.largest_unit());
+    format!("slice {shard}: {} % of the estimated work, {piece} % in one piece\n", percent(own))
 }

@@ -2,13 +2,16 @@
 
 use super::data::Data;
 use super::lpips::LpipsWeights;
+use super::selection::name_and_path;
 use anyhow::{Result, bail};
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use skinsplat::experiment::{
     self, AvatarRecipe, Experiment, GIVEN_AVATAR, GivenWeights, Options, Plan, Profile, Subset, Variant,
 };
 use skinsplat::run::{Library, RegisteredAvatar};
 use skinsplat_metrics::lpips::weights::Networks;
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// What to plan.
@@ -16,7 +19,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct Planning {
     /// Experiments: ids (see `reproduce list experiments`) or .toml files [default: the six tables]
     #[arg(value_name = "EXPERIMENT")]
-    experiments: Vec<String>,
+    experiments: Vec<OsString>,
     /// How much of the data to look at: quick (256 pixels, few frames, short fits), standard (everything), paper (long fits)
     #[arg(long, value_name = "P", default_value = "quick", value_parser = profile)]
     profile: Profile,
@@ -30,11 +33,11 @@ pub(super) struct Planning {
     #[arg(long)]
     all_strategies: bool,
     /// Take a variant's avatar from FILE, in which {subject} stands for the id of each subject (may be repeated)
-    #[arg(long = "avatar", value_name = "VARIANT=FILE", value_parser = given_avatar)]
+    #[arg(long = "avatar", value_name = "VARIANT=FILE", value_parser = given_avatar())]
     avatars: Vec<GivenAvatar>,
     /// Take a variant's frames from FOLDER, rendered by any program and named as the test frames; {subject} and {sequence}
     /// stand for their ids (may be repeated)
-    #[arg(long, value_name = "VARIANT=FOLDER", value_parser = given_avatar)]
+    #[arg(long, value_name = "VARIANT=FOLDER", value_parser = given_avatar())]
     renders: Vec<GivenAvatar>,
     /// Only test frames START <= index < END of each sequence
     #[arg(long, value_name = "START..END", value_parser = range, help_heading = "Subset")]
@@ -133,8 +136,9 @@ impl Planning {
                 chosen.push(Experiment::load(Path::new(name))?);
                 continue;
             }
-            let Some(experiment) = known.iter().find(|e| e.id == *name) else {
+            let Some(experiment) = known.iter().find(|e| *name == *e.id) else {
                 let ids: Vec<&str> = known.iter().map(|e| e.id.as_str()).collect();
+                let name = name.to_string_lossy();
                 bail!("experiment `{name}`; expected a .toml file or one of {}", ids.join(", "));
             };
             chosen.push(experiment.clone());
@@ -195,13 +199,12 @@ pub(super) fn profile(id: &str) -> Result<Profile, String> {
     Profile::preset(id).ok_or_else(|| format!("expected one of {}", Profile::IDS.join(", ")))
 }
 
-fn given_avatar(text: &str) -> Result<GivenAvatar, String> {
-    match text.split_once('=') {
-        Some((variant, file)) if !variant.is_empty() && !file.is_empty() => {
-            Ok(GivenAvatar { variant: variant.to_owned(), file: file.into() })
-        }
-        _ => Err("expected VARIANT=FILE, such as original=avatars/{subject}.ply".to_owned()),
-    }
+fn given_avatar() -> impl TypedValueParser<Value = GivenAvatar> {
+    let expected = "expected VARIANT=FILE, such as original=avatars/{subject}.ply";
+    OsStringValueParser::new().try_map(move |text| {
+        let (variant, file) = name_and_path(&text).ok_or(expected)?;
+        Ok::<_, &str>(GivenAvatar { variant, file })
+    })
 }
 
 /// The name under which the avatar is registered that an argument gives to a variant: no data set has it.

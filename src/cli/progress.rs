@@ -1,5 +1,6 @@
 //! Progress: a bar on a terminal, a line per avatar and per sequence elsewhere.
 
+use super::output::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skinsplat::run::Event;
 use skinsplat_fit::train::Step;
@@ -61,10 +62,9 @@ impl Watch {
     }
 
     /// A line, where there is no bar.
-    #[allow(clippy::print_stderr, reason = "progress for whoever reads the log")]
     fn line(&self, text: &str) {
         if self.lines {
-            eprintln!("{text}");
+            say(text);
         }
     }
 
@@ -84,10 +84,9 @@ impl Watch {
     }
 
     /// Says something above the bar.
-    #[allow(clippy::print_stderr, reason = "a warning for the person at the terminal")]
     pub(super) fn above(&self, text: &str, quiet: bool) {
         if !quiet {
-            self.bar.suspend(|| eprintln!("{text}"));
+            self.bar.suspend(|| say(text));
         }
     }
 

@@ -1,9 +1,8 @@
 //! `reproduce report`: the tables of a run again, or against a baseline.
 
 use super::compare::{Comparing, folder, load};
-use super::output::{emit, written};
+use super::output::{emit, save, written};
 use super::page::{Images, page, write_page};
-use super::run::stores;
 use super::selection::read_json;
 use super::{Context, Exit};
 use anyhow::{Result, anyhow};
@@ -11,9 +10,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use skinsplat::report::{self, Results};
 use skinsplat::run::provenance::Phases;
 use skinsplat::run::store;
-use skinsplat_data::atomic;
 use skinsplat_table::{FORMATS, to_json};
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Print the tables of a run again.
@@ -65,7 +62,7 @@ impl Report {
         let text = if self.timing { self.timing(&results)? } else { self.tables(&results)? };
         match &self.out {
             Some(path) if self.format == HTML => write_page(path, &text, context)?,
-            Some(path) => atomic::write(path, |w| w.write_all(text.as_bytes()))?,
+            Some(path) => save(path, &text)?,
             None => emit(&text)?,
         }
         Ok(if results.missing() > 0 { Exit::Incomplete } else { Exit::Success })
@@ -85,7 +82,7 @@ impl Report {
     }
 
     fn timing(&self, results: &Results) -> Result<String> {
-        let records = store::merge(stores(folder(&self.run))?.iter().map(PathBuf::as_path))?;
+        let records = store::merge(store::stores(folder(&self.run))?.iter().map(PathBuf::as_path))?;
         let mut tables = vec![report::timing::phases(results, &records)];
         let path = folder(&self.run).join("run.json");
         if path.is_file() {

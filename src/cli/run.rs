@@ -3,20 +3,20 @@
 use super::output::emit;
 use super::page::{Images, PICTURES, page, write_page};
 use super::planning::{Planned, Planning};
+use super::products::{AVATARS, make_folder, verdict, write_bend, write_curves, write_results, write_text};
 use super::{Context, Exit, progress::Watch};
 use anyhow::{Context as _, Result};
 use skinsplat::experiment::{Records, Shard, Unreadable};
 use skinsplat::report;
-use skinsplat::run::gallery;
 use skinsplat::run::motion::{self, Motion};
 use skinsplat::run::pictures;
+use skinsplat::run::plan_file::{LeftOut, PlanFile};
 use skinsplat::run::provenance::{Provenance, Stopwatch};
 use skinsplat::run::store::{self, FILE_NAME, Store};
-use skinsplat::run::{self, Error};
+use skinsplat::run::{self, Machine};
+use skinsplat::run::{cache, gallery};
 use skinsplat_data::atomic;
-use skinsplat_table::Format;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Where a run goes unless told otherwise.
@@ -26,8 +26,8 @@ pub(super) const DEFAULT_OUT: &str = "runs/default";
 ///
 /// Writes tables.md, one .csv and .tex per table, results.json (see reports/SCHEMA.md), curves.csv and curves/ (how the fits
 /// went) and run.json (who, when, how fast). frames.jsonl remembers every frame by its content: a run that is killed goes on
-/// where it stopped, and a run with other settings redoes only what they change. Slices (--shard) write results of their own;
-/// when all are done, run again without --shard to collect them.
+/// where it stopped, and a run with other settings redoes only what they change. Slices (--shard) write results of their own,
+/// which `reproduce merge` collects.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Run {
@@ -36,7 +36,7 @@ pub(super) struct Run {
     /// Folder to write to
     #[arg(long, value_name = "DIR", default_value = DEFAULT_OUT)]
     out: PathBuf,
-    /// Only this slice of the frames, counted from 1
+    /// Only this slice of the work, counted from 1: slices cost about the same, and what is drawn with one avatar stays together
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Also write images/: where the variants differ most, truth and variants side by side with their errors; and pictures/: single
@@ -57,9 +57,23 @@ pub(super) struct Run {
     /// Draw only every N-th pose of the motion
     #[arg(long, value_name = "N", requires = "motion", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     motion_every: u32,
+    /// What stays in the folder's avatars/ once every score is there: all, for pictures, motions and runs with other variants; or
+    /// none but the reports of fits, for small folders
+    #[arg(long, value_enum, value_name = "WHICH", default_value_t, conflicts_with = "shard")]
+    keep: KeepAvatars,
     /// Forget what the folder's results store knows
     #[arg(long, conflicts_with = "shard")]
     fresh: bool,
+}
+
+/// Which avatars stay.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+enum KeepAvatars {
+    /// All that were made
+    #[default]
+    All,
+    /// None
+    None,
 }
 
 const EXAMPLES: &str = "\
@@ -72,8 +86,26 @@ Examples:
   reproduce run table1 --html table1.html        Table 1 as a page with pictures";
 
 impl Run {
+    /// The options that only a run without slices can have, and whether they were given.
+    pub(super) fn whole_run_options(&self) -> [(&'static str, bool); 6] {
+        [
+            ("--out", self.out.as_os_str() != DEFAULT_OUT),
+            ("--shard", self.shard.is_some()),
+            ("--images", self.images.is_some()),
+            ("--html", self.html.is_some()),
+            ("--motion", self.motion.is_some()),
+            ("--fresh", self.fresh),
+        ]
+    }
+
+    /// How to go on after the run was stopped.
+    pub(super) fn advice(&self) -> String {
+        format!("what is done is kept in {}; the same command goes on from there", self.out.display())
+    }
+
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let start = Instant::now();
+        self.html.iter().try_for_each(|path| atomic::check(path))?;
         let mut planned = self.planning.plan()?;
         let motion = self.motion(&mut planned, context)?;
         let mut provenance = Provenance::starting(&planned.plan);
@@ -81,7 +113,7 @@ impl Run {
         make_folder(&self.out)?;
         [self.out.clone(), self.out.join(AVATARS)].iter().for_each(|folder| atomic::sweep(folder));
         if self.fresh {
-            for path in stores(&self.out)? {
+            for path in store::stores(&self.out)? {
                 std::fs::remove_file(&path).with_context(|| format!("{}: cannot remove", path.display()))?;
             }
         }
@@ -98,9 +130,13 @@ impl Run {
     /// Renders what is left to do; says how many frames that were.
     fn execute(&self, planned: &Planned, stopwatch: &Stopwatch, context: Context) -> Result<usize> {
         let Planned { plan, library, networks, .. } = planned;
-        let known = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
-        let left = store::outstanding(plan.shard(self.shard), &known);
-        let mut store = Store::open(&self.out.join(self.store_name()), &plan.digest)?;
+        let known = store::merge(store::stores(&self.out)?.iter().map(PathBuf::as_path))?;
+        let left = store::outstanding(&plan.shard(self.shard), &known);
+        if self.shard.is_some() {
+            PlanFile::new(plan, &planned.experiments, left_out(planned)).write(&self.out)?;
+        }
+        let path = self.out.join(self.store_name());
+        let mut store = Store::open(&path, &plan.digest, &Machine::here())?;
         let watch = Watch::new(context.quiet);
         let avatars = self.out.join(AVATARS);
         run::execute(plan, &left, library, networks, &avatars, &mut store, &|event| {
@@ -112,8 +148,8 @@ impl Run {
 
     /// Whether every frame of the slice has a score.
     fn verdict_of_shard(&self, Planned { plan, .. }: &Planned, context: Context) -> Result<Exit> {
-        let known = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
-        let left = store::outstanding(plan.shard(self.shard), &known);
+        let known = store::merge(store::stores(&self.out)?.iter().map(PathBuf::as_path))?;
+        let left = store::outstanding(&plan.shard(self.shard), &known);
         let missing: usize = left.iter().map(|job| job.variants.len()).sum();
         if missing == 0 {
             return Ok(Exit::Success);
@@ -136,11 +172,11 @@ impl Run {
         provenance: &Provenance,
         context: Context,
     ) -> Result<Exit> {
-        let records: Records = store::merge(stores(&self.out)?.iter().map(PathBuf::as_path))?;
+        let records: Records = store::merge(store::stores(&self.out)?.iter().map(PathBuf::as_path))?;
         let results = report::results(&planned.plan, &planned.experiments, &records)?;
         write_results(&self.out, &results)?;
-        self.write_curves(planned)?;
-        self.write_bend(&results)?;
+        write_curves(&self.out, &planned.plan, &planned.experiments, std::slice::from_ref(&self.out))?;
+        write_bend(&self.out, &results)?;
         write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
         if self.images.is_some_and(|which| which != Images::None) {
             self.write_images(planned, &records, context)?;
@@ -155,53 +191,18 @@ impl Run {
         let missing = results.missing();
         if missing > 0 {
             context.note(format!("{missing} scores are missing; {out}/{FILE_NAME} says why"));
-            return Ok(Exit::Incomplete);
         }
-        // Those that nobody asked for are missed by nobody.
-        let asked = &planned.plan.options.subset.subjects;
-        let unreadable = planned.library.unreadable();
-        let mut unreadable =
-            unreadable.filter(|(_, own)| asked.is_empty() || asked.contains(&own.subject)).peekable();
-        if unreadable.peek().is_some() {
-            for (dataset, Unreadable { subject, problem }) in unreadable {
-                context.note(format!("{dataset}/{subject}: left out: {problem}"));
-            }
-            return Ok(Exit::Incomplete);
+        let exit = verdict(&planned.plan, missing, &left_out(planned), context);
+        if self.keep == KeepAvatars::None && exit == Exit::Success {
+            let made = planned.plan.avatars.iter().map(|avatar| avatar.key.as_str());
+            let starts = planned.plan.avatars.iter().filter_map(|avatar| avatar.start());
+            cache::remove_entries(&self.out.join(AVATARS), made.chain(starts))?;
         }
-        if planned.plan.jobs.is_empty() {
-            context.note("no frame was selected: none of the experiments has data here");
-            return Ok(Exit::Incomplete);
-        }
-        Ok(Exit::Success)
+        Ok(exit)
     }
 }
 
 impl Run {
-    /// How the fits went, if there were any.
-    fn write_curves(&self, Planned { plan, experiments, .. }: &Planned) -> Result<()> {
-        let curves = run::curves::curves(plan, &self.out.join(AVATARS))?;
-        if curves.is_empty() {
-            return Ok(());
-        }
-        write_text(&self.out.join("curves.csv"), &report::curves_csv(&curves))?;
-        let folder = self.out.join("curves");
-        make_folder(&folder)?;
-        for (name, svg) in report::curve_plots(&curves, experiments)? {
-            write_text(&folder.join(format!("{name}.svg")), &svg)?;
-        }
-        Ok(())
-    }
-
-    /// Differences by how far the body is bent, if a table asks for them.
-    fn write_bend(&self, results: &report::Results) -> Result<()> {
-        let Some(lines) = report::bend_csv(results) else { return Ok(()) };
-        write_text(&self.out.join("bend.csv"), &lines)?;
-        for (table, svg) in report::bend_plots(results)? {
-            write_text(&self.out.join(format!("{table}-bend.svg")), &svg)?;
-        }
-        Ok(())
-    }
-
     /// The motion that the arguments name, with a word in the captions.
     fn motion(&self, planned: &mut Planned, context: Context) -> Result<Option<Motion>> {
         let Some(path) = &self.motion else { return Ok(None) };
@@ -259,47 +260,11 @@ impl Run {
     }
 }
 
-/// Folder, inside the run's, of the avatars that it made.
-const AVATARS: &str = "avatars";
-
-/// The results stores of a run's folder, sorted.
-pub(super) fn stores(folder: &Path) -> Result<Vec<PathBuf>> {
-    if !folder.is_dir() {
-        return Ok(Vec::new());
-    }
-    let context = || format!("{}: cannot list the folder", folder.display());
-    let mut paths = Vec::new();
-    for entry in std::fs::read_dir(folder).with_context(context)? {
-        let path = entry.with_context(context)?.path();
-        // A pipe of such a name would be waited for.
-        if path.extension().is_some_and(|e| e == "jsonl") && path.is_file() {
-            paths.push(path);
-        }
-    }
-    paths.sort();
-    Ok(paths)
-}
-
-/// Formats that each table is written in, in a file of its own.
-const TABLE_FILES: [&str; 2] = ["csv", "latex"];
-
-/// Every form of the tables.
-pub(super) fn write_results(folder: &Path, results: &report::Results) -> Result<()> {
-    write_text(&folder.join("tables.md"), &report::page(results))?;
-    write_text(&folder.join("results.json"), &results.to_json())?;
-    for table in &results.tables {
-        for format in TABLE_FILES.iter().filter_map(|id| Format::named(id)) {
-            let file = format!("{}.{}", table.experiment, format.extension);
-            write_text(&folder.join(file), &(format.write)(&table.table))?;
-        }
-    }
-    Ok(())
-}
-
-fn write_text(path: &Path, text: &str) -> Result<()> {
-    Ok(atomic::write(path, |w| w.write_all(text.as_bytes()))?)
-}
-
-fn make_folder(folder: &Path) -> Result<()> {
-    Ok(std::fs::create_dir_all(folder).map_err(|source| Error::Folder { path: folder.to_owned(), source })?)
+/// Subjects that could not be used.
+fn left_out(planned: &Planned) -> Vec<LeftOut> {
+    let of = |(dataset, subject): (&str, &Unreadable)| LeftOut {
+        dataset: dataset.to_owned(),
+        subject: subject.clone(),
+    };
+    planned.library.unreadable().map(of).collect()
 }

@@ -2,13 +2,37 @@
 
 use anyhow::{Context as _, Result};
 use serde::de::DeserializeOwned;
-use std::path::Path;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 /// Reads a JSON file into a type; the error names the file and the place in it. A byte order mark is skipped.
 pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot read", path.display()))?;
+    let text = skinsplat_data::source::read_to_string(path)
+        .with_context(|| format!("{}: cannot read", path.display()))?;
     let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
     serde_json::from_str(json).with_context(|| format!("{}: not the JSON that was expected", path.display()))
+}
+
+/// `NAME=PATH`, split at the first sign; the path may have any bytes.
+pub(super) fn name_and_path(text: &OsStr) -> Option<(String, PathBuf)> {
+    let split = match text.to_str() {
+        Some(text) => text.split_once('=').map(|(name, path)| (name.to_owned(), PathBuf::from(path)))?,
+        None => split_bytes(text)?,
+    };
+    (!split.0.is_empty() && !split.1.as_os_str().is_empty()).then_some(split)
+}
+
+#[cfg(unix)]
+fn split_bytes(text: &OsStr) -> Option<(String, PathBuf)> {
+    use std::os::unix::ffi::OsStrExt;
+    let at = text.as_bytes().iter().position(|&byte| byte == b'=')?;
+    let (name, path) = text.as_bytes().split_at(at);
+    Some((std::str::from_utf8(name).ok()?.to_owned(), PathBuf::from(OsStr::from_bytes(&path[1..]))))
+}
+
+#[cfg(not(unix))]
+fn split_bytes(_: &OsStr) -> Option<(String, PathBuf)> {
+    None
 }
 
 /// Three comma-separated numbers in \[0, 1\].

@@ -62,7 +62,7 @@ impl Stress {
         }
         let shown = report.pictures.iter().map(|picture| {
             let path = out.join(&picture.file);
-            std::fs::read(&path).with_context(|| format!("{}: cannot read", path.display()))
+            skinsplat_data::source::read(&path).with_context(|| format!("{}: cannot read", path.display()))
         });
         let html = stress::page(&report, &shown.collect::<Result<Vec<_>>>()?).html();
         write(&out.join("stress.html"), &html)?;

@@ -2,6 +2,7 @@
 
 use super::data::Data;
 use super::output::emit;
+use super::products::make_folder;
 use super::progress::Watch;
 use super::{Context, Exit};
 use anyhow::{Context as _, Result, bail};
@@ -77,6 +78,7 @@ fn table(id: &str) -> Result<&'static str, String> {
 
 impl Trading {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        make_folder(&self.out)?;
         let (name, subject) = self.subject()?;
         let (subject, given) = match &self.avatar {
             Some(path) => {
@@ -166,8 +168,6 @@ impl Trading {
 
     /// Writes the pictures and the result in three formats; returns the page.
     fn write(&self, result: &Trade, sweeps: &[Sweep]) -> Result<String> {
-        std::fs::create_dir_all(&self.out)
-            .with_context(|| format!("{}: cannot make the folder", self.out.display()))?;
         let save = |name: &str, bytes: &[u8]| atomic::write(&self.out.join(name), |w| w.write_all(bytes));
         let mut pictures = Vec::new();
         for sweep in sweeps {

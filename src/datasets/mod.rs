@@ -159,6 +159,10 @@ impl Registry {
             if !ids.insert(dataset.id.clone()) {
                 return Err(invalid("id", format!("{:?} again", dataset.id), "an id of its own"));
             }
+            if !is_folder_name(&dataset.id) {
+                let expected = "a name that a folder could have";
+                return Err(invalid("id", format!("the path {:?}", dataset.id), expected));
+            }
             let names = dataset.subjects.iter().chain(dataset.folders.values());
             if let Some(name) = names.into_iter().find(|name| !is_folder_name(name)) {
                 return Err(invalid(

@@ -4,7 +4,7 @@ use super::{
     AvatarFile, AvatarRecipe, AvatarState, CodeVersions, DataRow, PoseNoise, Profile, RenderedFrames, Role,
     SubjectInfo, Variant,
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use skinsplat_data::key::content_key;
 use skinsplat_data::select::evenly_spaced;
@@ -16,7 +16,7 @@ use skinsplat_fit::{FitOptions, Recipe};
 use std::path::{Path, PathBuf};
 
 /// An avatar to be made or read before its jobs can run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedAvatar {
     /// Content key.
     pub key: String,
@@ -30,7 +30,7 @@ pub struct PlannedAvatar {
 }
 
 /// Where an avatar comes from.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "from", rename_all = "kebab-case")]
 #[allow(clippy::large_enum_variant, reason = "a plan holds few, and a fit is the usual one")]
 pub enum AvatarSource {
@@ -39,6 +39,7 @@ pub enum AvatarSource {
         /// Name under which it is registered.
         name: String,
         /// The file, or the folder of an export. No key depends on it.
+        #[serde(serialize_with = "super::lossy::path")]
         path: PathBuf,
         /// Digest of what it holds.
         digest: String,
@@ -84,7 +85,7 @@ pub enum AvatarSource {
 }
 
 /// The frames that an avatar is made from.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrainingFrames {
     /// Training sequence.
     pub sequence: String,
@@ -101,7 +102,7 @@ pub struct TrainingFrames {
 }
 
 /// A fit to be made.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedFit {
     /// Recipe and budget.
     pub options: FitOptions,
@@ -117,6 +118,14 @@ impl PlannedAvatar {
             AvatarSource::Surface { training, .. }
             | AvatarSource::Textured { training, .. }
             | AvatarSource::Fit { training, .. } => Some(training),
+        }
+    }
+
+    /// The key of the avatar with which its fit starts; none if it is not fitted.
+    pub fn start(&self) -> Option<&str> {
+        match &self.source {
+            AvatarSource::Fit { fit, .. } => Some(&fit.start),
+            _ => None,
         }
     }
 

@@ -40,6 +40,9 @@ pub struct SequenceInfo {
     pub digest: String,
     /// The frames, in the order in which the loader numbers them.
     pub frames: Vec<FrameInfo>,
+    /// Width and height of the largest image as stored, pixels, if somebody knows: for estimates of cost.
+    #[serde(default)]
+    pub image: Option<[u32; 2]>,
 }
 
 /// A person (or figure) and the sequences in which it was seen.
@@ -69,12 +72,15 @@ pub struct SubjectInfo {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RenderedFrames {
     /// Where an experiment says they are. No key depends on it.
+    #[serde(serialize_with = "super::lossy::path")]
     pub path: PathBuf,
     /// Where those of this sequence are.
+    #[serde(serialize_with = "super::lossy::path")]
     pub folder: PathBuf,
     /// The sequence.
     pub sequence: String,
     /// The images that were found, by the names of the frames.
+    #[serde(serialize_with = "super::lossy::paths")]
     pub frames: BTreeMap<String, PathBuf>,
     /// Digest of them all.
     pub digest: String,
@@ -92,6 +98,7 @@ pub struct AvatarFile {
     /// Name that experiments use, unique in its subject.
     pub name: String,
     /// The file, or the folder of an export. No key depends on it.
+    #[serde(serialize_with = "super::lossy::path")]
     pub path: PathBuf,
     /// What was found there.
     pub state: AvatarState,

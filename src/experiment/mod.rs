@@ -15,6 +15,7 @@ mod embedded;
 mod equivalence;
 mod error;
 mod grid;
+mod lossy;
 mod paper;
 mod plan;
 mod poses;
@@ -23,6 +24,7 @@ mod record;
 mod rows;
 mod seeds;
 mod shard;
+mod slices;
 mod spec;
 mod validate;
 mod versions;
@@ -41,7 +43,8 @@ pub use profile::{GivenWeights, Options, Profile, Subset};
 pub use record::{FittedOutcome, FrameRecord, Outcome, Records, Seconds};
 pub use rows::{DataRow, RowDigests, Source};
 pub use seeds::Replicate;
-pub use shard::Shard;
+pub use shard::{MOST_SHARDS, Shard};
+pub use slices::Slices;
 pub use spec::{
     ADDED_VARIANT, AvatarRecipe, Average, Column, Experiment, GIVEN_AVATAR, Layout, Shown, StandIn, Variant,
 };

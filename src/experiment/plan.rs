@@ -3,10 +3,10 @@
 use super::avatar::{PlannedAvatar, Planner};
 use super::rows::{DataRow, Source, rows_of};
 use super::{
-    CodeVersions, Dataset, Error, Experiment, Options, PoseNoise, SequenceInfo, Shard, SubjectInfo, Variant,
-    catalog,
+    CodeVersions, Dataset, Error, Experiment, Options, PoseNoise, SequenceInfo, Shard, Slices, SubjectInfo,
+    Variant, catalog,
 };
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::json;
 use skinsplat_data::key::content_key;
 use skinsplat_fit::options::PoseFit;
@@ -16,7 +16,8 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Everything that a run has to do and a report has to show, as plain data.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Plan {
     /// What was asked for.
     pub options: Options,
@@ -41,17 +42,23 @@ impl Plan {
         self.avatars.iter().find(|avatar| avatar.key == key)
     }
 
-    /// The jobs of a shard (all of them without one), in order.
-    pub fn shard(&self, shard: Option<Shard>) -> Vec<&Job> {
+    /// The jobs of a shard (all of them without one), in order, each with its variants that belong to the shard.
+    pub fn shard(&self, shard: Option<Shard>) -> Vec<Job> {
         match shard {
-            Some(shard) => shard.slice(&self.jobs).collect(),
-            None => self.jobs.iter().collect(),
+            Some(shard) => Slices::of(self, shard.count()).jobs(&self.jobs, shard),
+            None => self.jobs.clone(),
         }
+    }
+
+    /// The digest that a plan has with these options, tables and jobs.
+    pub fn digest_of(options: &Options, tables: &[PlannedTable], jobs: &[Job]) -> String {
+        content_key(&json!({ "options": options, "tables": tables, "jobs": jobs }))
     }
 }
 
 /// One table and the data it will be made from.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PlannedTable {
     /// Id of the experiment.
     pub experiment: String,
@@ -66,16 +73,17 @@ pub struct PlannedTable {
     /// The scoring protocol.
     pub protocol: ProtocolId,
     /// What a reader has to know of the data, a clause per subject.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub data_notes: Vec<String>,
     /// Sentences of the caption on what else the run makes of the table's avatars: no number depends on it.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
 }
 
 /// One test frame of one table: the truth is loaded once and every variant is rendered and scored against it, so that
 /// comparisons are paired.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Job {
     /// Index into [`Plan::tables`].
     pub table: usize,
@@ -92,7 +100,7 @@ pub struct Job {
     /// Name of the frame.
     pub name: String,
     /// The scoring protocol; serialised as its id.
-    #[serde(serialize_with = "id")]
+    #[serde(serialize_with = "id", deserialize_with = "protocol")]
     pub protocol: Arc<Protocol>,
     /// Longer side to which the frame is reduced, pixels; native if absent.
     pub resolution: Option<u32>,
@@ -118,7 +126,8 @@ impl Job {
 }
 
 /// One way of rendering a frame.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct JobVariant {
     /// Id of the variant.
     pub id: String,
@@ -127,13 +136,13 @@ pub struct JobVariant {
     /// Key of the [`PlannedAvatar`].
     pub avatar: String,
     /// How its Gaussians are posed; none for a textured mesh. Serialised as its spec.
-    #[serde(serialize_with = "spec")]
+    #[serde(serialize_with = "spec", deserialize_with = "strategy")]
     pub strategy: Option<Strategy>,
     /// Noise on the pose of the frame.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<PoseNoise>,
     /// How the pose is fitted to the image for a further score; none if it is not.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fitted: Option<PoseFit>,
 }
 
@@ -143,6 +152,16 @@ fn id<S: Serializer>(protocol: &Protocol, serializer: S) -> Result<S::Ok, S::Err
 
 fn spec<S: Serializer>(strategy: &Option<Strategy>, serializer: S) -> Result<S::Ok, S::Error> {
     strategy.map(|strategy| strategy.to_string()).serialize(serializer)
+}
+
+fn protocol<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Arc<Protocol>, D::Error> {
+    let id = String::deserialize(deserializer)?;
+    Protocol::parse(&id).map(Arc::new).map_err(serde::de::Error::custom)
+}
+
+fn strategy<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Strategy>, D::Error> {
+    let spec = Option::<String>::deserialize(deserializer)?;
+    spec.map(|spec| spec.parse().map_err(serde::de::Error::custom)).transpose()
 }
 
 /// Plans the experiments on the data at hand.
@@ -161,7 +180,7 @@ pub fn plan(experiments: &[Experiment], datasets: &[Dataset], options: &Options)
     let tables: Vec<PlannedTable> =
         numbered.map(|(index, experiment)| builder.table(index, experiment)).collect::<Result<_, _>>()?;
     let Builder { avatars, jobs, .. } = builder;
-    let digest = content_key(&json!({ "options": options, "tables": tables, "jobs": jobs }));
+    let digest = Plan::digest_of(options, &tables, &jobs);
     Ok(Plan { options: options.clone(), tables, avatars, jobs, digest })
 }
 

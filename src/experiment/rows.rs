@@ -17,7 +17,8 @@ pub enum Source {
 }
 
 /// A sequence of the table: one subject's test sequence, and the training frames that go with it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct DataRow {
     /// `dataset/subject/sequence`, unique in the table.
     pub id: String,
@@ -38,10 +39,14 @@ pub struct DataRow {
     /// Digests of the test and the training sequence, if there is data. The keys of the jobs hold them already.
     #[serde(skip)]
     pub data: Option<RowDigests>,
+    /// Width and height of the test images as stored, pixels, if somebody knows. No number depends on it.
+    #[serde(skip)]
+    pub image: Option<[u32; 2]>,
 }
 
 /// Digests of the data of a row.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct RowDigests {
     /// Of the test sequence.
     pub test: String,
@@ -118,6 +123,7 @@ fn own_rows(experiment: &Experiment, dataset: &Dataset, options: &Options) -> Ve
                 train: None,
                 missing: Some(missing),
                 data: None,
+                image: None,
             });
         }
         rows.extend(found);
@@ -217,5 +223,6 @@ fn data_row(
         train: train.map(|(sequence, frames)| (sequence.id.clone(), thin(frames))),
         missing,
         data: Some(RowDigests { test: test.digest.clone(), train: train_digest }),
+        image: test.image,
     }
 }

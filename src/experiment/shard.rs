@@ -1,42 +1,59 @@
-//! A slice of the jobs, for runs on several machines.
+//! The name of a slice of the work, for runs on several machines. What it holds: [`super::Slices`].
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Slice `index` of `count`, counted from 1: every `count`-th job, so that slices are alike in cost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Slice `index` of `count`, counted from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Shard {
-    index: usize,
+    // In the order in which slices are sorted: those of one splitting stay together.
     count: usize,
+    index: usize,
 }
+
+/// Most slices of a plan.
+pub const MOST_SHARDS: usize = 10_000;
 
 impl Shard {
     /// Slice `index` of `count`.
     ///
     /// # Errors
-    /// If not `1 <= index <= count`.
+    /// If not `1 <= index <= count <=` [`MOST_SHARDS`].
     pub fn new(index: usize, count: usize) -> Result<Self, String> {
-        if index == 0 || index > count {
-            return Err(format!("shard {index}/{count}: expected i/n with 1 <= i <= n, such as 1/4"));
+        if index == 0 || index > count || count > MOST_SHARDS {
+            return Err(format!(
+                "shard {index}/{count}: expected i/n with 1 <= i <= n <= {MOST_SHARDS}, such as 1/4"
+            ));
         }
-        Ok(Self { index, count })
+        Ok(Self { count, index })
     }
 
-    /// True for the job at this position of the plan.
-    pub fn contains(self, position: usize) -> bool {
-        position % self.count == self.index - 1
+    /// Every slice of so many.
+    pub fn all(count: usize) -> impl Iterator<Item = Self> {
+        (1..=count).map(move |index| Self { count, index })
     }
 
-    /// Those of the items that belong to the shard, in order.
-    pub fn slice<T>(self, items: &[T]) -> impl Iterator<Item = &T> {
-        items.iter().skip(self.index - 1).step_by(self.count)
+    /// Which slice, from 1.
+    pub fn index(self) -> usize {
+        self.index
+    }
+
+    /// Of how many.
+    pub fn count(self) -> usize {
+        self.count
     }
 
     /// Name of the shard's results file.
     pub fn file_name(self) -> String {
         format!("shard-{:02}-of-{:02}.jsonl", self.index, self.count)
+    }
+
+    /// The shard whose results file has this name; none if it is the name of something else.
+    pub fn of_file_name(name: &str) -> Option<Self> {
+        let (index, count) = name.strip_prefix("shard-")?.strip_suffix(".jsonl")?.split_once("-of-")?;
+        Self::new(index.parse().ok()?, count.parse().ok()?).ok()
     }
 }
 
@@ -74,32 +91,19 @@ impl TryFrom<String> for Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::{prop_assert_eq, proptest};
 
     #[test]
     fn the_form_is_checked() {
         assert_eq!("2/3".parse(), Shard::new(2, 3));
-        for wrong in ["", "1", "0/3", "4/3", "1/0", "a/b", "1/2/3", "-1/2", " 1/2"] {
+        for wrong in ["", "1", "0/3", "4/3", "1/0", "a/b", "1/2/3", "-1/2", " 1/2", "1/10001"] {
             let error = wrong.parse::<Shard>().expect_err(wrong);
             assert!(error.contains("1 <= i <= n"), "{error}");
         }
-        assert_eq!(Shard::new(3, 16).expect("valid").file_name(), "shard-03-of-16.jsonl");
-    }
-
-    proptest! {
-        #[test]
-        fn shards_partition_the_jobs_exactly(jobs in 0_usize..50, count in 1_usize..20) {
-            let all: Vec<usize> = (0..jobs).collect();
-            let mut seen = Vec::new();
-            for index in 1..=count {
-                let shard = Shard::new(index, count).expect("within range");
-                let slice: Vec<usize> = shard.slice(&all).copied().collect();
-                let by_position: Vec<usize> = all.iter().copied().filter(|&p| shard.contains(p)).collect();
-                prop_assert_eq!(&slice, &by_position);
-                seen.extend(slice);
-            }
-            seen.sort_unstable();
-            prop_assert_eq!(seen, all);
+        let shard = Shard::new(3, 16).expect("valid");
+        assert_eq!(shard.file_name(), "shard-03-of-16.jsonl");
+        assert_eq!(Shard::of_file_name("shard-03-of-16.jsonl"), Some(shard));
+        for other in ["frames.jsonl", "shard-3.jsonl", "shard-03-of-16.json", "shard-17-of-16.jsonl"] {
+            assert_eq!(Shard::of_file_name(other), None, "{other}");
         }
     }
 }

@@ -5,7 +5,7 @@ use super::{
     poses, seeds, validate,
 };
 use serde::{Deserialize, Serialize};
-use skinsplat_data::{Capture, Gender};
+use skinsplat_data::{Capture, Gender, source};
 use skinsplat_fit::options::PoseFit;
 use skinsplat_metrics::MetricId;
 use skinsplat_posing::PRESETS;
@@ -287,6 +287,7 @@ pub enum AvatarRecipe {
     /// `splats`, `bytes` and `milliseconds`.
     Renders {
         /// The folder; `{subject}` and `{sequence}` stand for their ids. Relative to the experiment's file.
+        #[serde(serialize_with = "super::lossy::path")]
         path: PathBuf,
     },
 }
@@ -329,7 +330,7 @@ impl Experiment {
     /// # Errors
     /// Names the file and the line or key.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
+        let text = source::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
         let mut experiment = Self::parse(&text, &path.display().to_string())?;
         let folder = path.parent().unwrap_or(Path::new(""));
         for variant in &mut experiment.variants {

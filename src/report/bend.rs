@@ -45,8 +45,8 @@ pub fn bend_csv(results: &Results) -> Option<String> {
                     &mut lines,
                     &[
                         table.experiment.clone(),
-                        variant.to_owned(),
-                        baseline.to_owned(),
+                        skinsplat_table::csv_text(variant),
+                        skinsplat_table::csv_text(baseline),
                         class[0].to_string(),
                         class[1].to_string(),
                         format!("{:.4}", estimate.mean),

@@ -3,6 +3,7 @@
 use crate::experiment::Experiment;
 use crate::run::curves::{Curve, CurvePoint};
 use skinsplat_plot::{Lines, PlotError, Series, svg};
+use skinsplat_table::csv_text;
 use std::collections::BTreeMap;
 
 /// A line per point, a column per number; a field without a number is empty.
@@ -14,7 +15,7 @@ pub fn curves_csv(curves: &[Curve]) -> String {
         |value: Option<f64>, digits: usize| value.map_or_else(String::new, |v| format!("{v:.digits$}"));
     for Curve { experiment, dataset, subject, variant, points } in curves {
         for point in points {
-            let names = [experiment, dataset, subject, variant].map(Clone::clone);
+            let names = [experiment, dataset, subject, variant].map(|name| csv_text(name));
             let numbers = [
                 point.iteration.to_string(),
                 number(point.loss, 6),

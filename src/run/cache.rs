@@ -39,11 +39,11 @@ impl Entry {
     ) -> Result<(), Error> {
         match self.damage() {
             None => return Ok(()),
-            Some(damage) => {
-                if self.discard()? {
-                    say(format!("{}: {damage}; made again", self.path(self.extensions[0]).display()))?;
-                }
+            // Nothing is removed: another process may be making the same entry, bit for bit, and each file is replaced at once.
+            Some(damage) if self.is_there() => {
+                say(format!("{}: {damage}; made again", self.path(self.extensions[0]).display()))?;
             }
+            Some(_) => {}
         }
         make()?;
         self.seal()
@@ -51,7 +51,7 @@ impl Entry {
 
     /// What is wrong with the entry, if anything is.
     fn damage(&self) -> Option<String> {
-        let Ok(sums) = std::fs::read_to_string(self.path(SUMS)) else {
+        let Ok(sums) = skinsplat_data::source::read_to_string(&self.path(SUMS)) else {
             return Some("no checksum".to_owned());
         };
         let differs = |extension: &&&str| {
@@ -76,15 +76,28 @@ impl Entry {
         Ok(format!("{}  {}.{extension}", file_digest(&self.path(extension))?, self.key))
     }
 
-    /// Removes what there is of the entry; true if there was something.
-    fn discard(&self) -> Result<bool, Error> {
-        let mut found = false;
-        for extension in self.extensions.iter().chain(&[SUMS]) {
-            found |= remove(&self.path(extension))?;
-        }
-        Ok(found)
+    /// True if there is something of the entry.
+    fn is_there(&self) -> bool {
+        self.extensions.iter().chain(&[SUMS]).any(|extension| self.path(extension).exists())
     }
 }
+
+/// Removes the entries of some keys, but for the reports of fits (`KEY.json`), which say how an avatar was made. Their checksums
+/// go first: what is left of an entry when this is interrupted does not count.
+///
+/// # Errors
+/// A file that cannot be removed.
+pub fn remove_entries<'a>(folder: &Path, keys: impl IntoIterator<Item = &'a str>) -> Result<(), Error> {
+    for key in keys {
+        for extension in [SUMS].iter().chain(&PARTS) {
+            remove(&folder.join(format!("{key}.{extension}")))?;
+        }
+    }
+    Ok(())
+}
+
+/// Extensions of what an avatar consists of, but for the report of a fit.
+const PARTS: [&str; 5] = ["ply", "npy", "vertices.npy", "texture.png", "poses.json"];
 
 /// Extension of the checksums.
 const SUMS: &str = "sha256";

@@ -4,7 +4,7 @@ use super::Error;
 use super::fitting::FitReport;
 use crate::experiment::Plan;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::PathBuf;
 
 /// The way of one fit, as one variant of a table draws it.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,12 +37,12 @@ pub struct CurvePoint {
     pub test_psnr: Option<f64>,
 }
 
-/// The curves of the fits that a plan names, from the sidecars in the run's folder of avatars. Fits that are not there yet
-/// are left out.
+/// The curves of the fits that a plan names, from the sidecars in runs' folders of avatars. Fits that are not there yet are left
+/// out.
 ///
 /// # Errors
 /// A sidecar that is no sidecar.
-pub fn curves(plan: &Plan, folder: &Path) -> Result<Vec<Curve>, Error> {
+pub fn curves(plan: &Plan, folders: &[PathBuf]) -> Result<Vec<Curve>, Error> {
     let mut curves = Vec::new();
     let mut seen = BTreeSet::new();
     for job in &plan.jobs {
@@ -51,8 +51,10 @@ pub fn curves(plan: &Plan, folder: &Path) -> Result<Vec<Curve>, Error> {
             if !seen.insert((experiment, &job.dataset, &job.subject, &variant.id)) {
                 continue;
             }
-            let path = folder.join(format!("{}.json", variant.avatar));
-            let Ok(text) = std::fs::read_to_string(&path) else { continue };
+            let name = format!("{}.json", variant.avatar);
+            let found = folders.iter().map(|folder| folder.join(&name)).find(|path| path.is_file());
+            let Some(path) = found else { continue };
+            let Ok(text) = skinsplat_data::source::read_to_string(&path) else { continue };
             let report: FitReport = serde_json::from_str(&text)
                 .map_err(|error| Error::Sidecar { path, problem: error.to_string() })?;
             curves.push(Curve {

@@ -75,6 +75,45 @@ pub enum Error {
         /// What is wrong.
         problem: String,
     },
+    /// The plan beside the stores of its shards, if it is none.
+    #[error("{}: {problem}; expected the plan of a run, as `run --shard` writes it", path.display())]
+    PlanFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A store whose plan is nowhere.
+    #[error("{}: no {name} beside it; expected the plan that `run --shard` writes there", store.display())]
+    NoPlanFile {
+        /// The store.
+        store: PathBuf,
+        /// Name of the file.
+        name: String,
+    },
+    /// A folder in which nobody computed.
+    #[error("{}: no results; expected the folder of a `run --shard`", folder.display())]
+    NoStores {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Stores of two plans.
+    #[error(
+        "{} and {} are of two plans: {field}: {first_has} in the first, {second_has} in the second; expected slices of one",
+        first.display(), second.display()
+    )]
+    MixedPlans {
+        /// A store of the one.
+        first: PathBuf,
+        /// A store of the other.
+        second: PathBuf,
+        /// The first field that differs.
+        field: String,
+        /// What it is there.
+        first_has: String,
+        /// What it is here.
+        second_has: String,
+    },
     /// Data that the plan names and the library does not have.
     #[error("{name}: not among the data at hand; expected the data that the plan was made from")]
     Absent {

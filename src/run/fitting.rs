@@ -288,7 +288,7 @@ impl Progress {
             return Ok(Self::default());
         }
         let cannot = |source| Error::File { path: path.into(), action: "read", source };
-        let bytes = std::fs::read(path).map_err(cannot)?;
+        let bytes = skinsplat_data::source::read(path).map_err(cannot)?;
         let damaged = |problem: String| Error::Checkpoint { path: path.into(), problem };
         let content = bytes.strip_prefix(CHECKPOINT).and_then(|rest| rest.split_first_chunk::<32>());
         match content {

@@ -122,7 +122,7 @@ fn describe_subject(
             |f: &skinsplat_data::FrameRef| FrameInfo { name: f.name.clone(), time: f.time, camera: f.camera };
         let digest = sequence.digest()?;
         let frames = sequence.frames.iter().map(frame).collect();
-        Ok(SequenceInfo { id: sequence.id.clone(), role, digest, frames })
+        Ok(SequenceInfo { id: sequence.id.clone(), role, digest, frames, image: largest_image(sequence) })
     };
     let sequences = sequences.par_iter().map(describe).collect::<Result<_, skinsplat_data::Error>>()?;
     let avatars = dataset.avatars.iter().map(|avatar| describe_avatar(avatar, subject)).collect();
@@ -135,6 +135,12 @@ fn describe_subject(
     notes.extend(subject.sequences().flat_map(misfits));
     let (id, capture) = (subject.id.clone(), subject.capture);
     Ok(SubjectInfo { id, capture, sequences, split_given, notes, avatars, renders })
+}
+
+/// Width and height of the largest image of a sequence.
+fn largest_image(sequence: &Sequence) -> Option<[u32; 2]> {
+    let sizes = sequence.cameras.iter().map(|camera| [camera.width, camera.height]);
+    sizes.max_by_key(|[width, height]| u64::from(*width) * u64::from(*height))
 }
 
 /// Frames of a sequence that are looked at before a run.

@@ -2,7 +2,7 @@
 //!
 //! [`Library`] holds the data at hand, `avatars` makes or reads what is to be drawn, a
 //! [`Drawable`](drawable::Drawable); `frame` is where one is drawn in a pose and scored. [`execute()`] walks the frames,
-//! [`store`] remembers every record by its content key, [`gallery`] shows where the variants differ, [`motion`]
+//! [`store`] remembers every record by its content key, [`merge`] collects those of several machines, [`gallery`] shows where the variants differ, [`motion`]
 //! draws them in poses that no frame has.
 //!
 //! Each file imports only from those before it in this list: `textured`, `foreign`, `drawable`, `library`, `frame`,
@@ -23,8 +23,11 @@ mod frame;
 pub mod gallery;
 pub mod held_out;
 mod library;
+mod machine;
+pub mod merge;
 pub mod motion;
 pub mod pictures;
+pub mod plan_file;
 pub mod provenance;
 mod refined_poses;
 pub mod renders;
@@ -34,3 +37,4 @@ pub mod textured;
 pub use error::Error;
 pub use execute::{Event, execute};
 pub use library::{Library, LoadedDataset, RegisteredAvatar};
+pub use machine::Machine;

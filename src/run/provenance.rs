@@ -1,6 +1,6 @@
 //! Who computed a result, when and with what: kept apart from results, which depend on none of it.
 
-use super::Event;
+use super::{Event, Machine};
 use crate::experiment::{CodeVersions, Plan};
 use serde::{Deserialize, Serialize};
 use skinsplat_data::avatar::file_digest;
@@ -19,6 +19,8 @@ pub struct Provenance {
     pub binary: Option<String>,
     /// Operating system and processor architecture.
     pub platform: String,
+    /// Name of the machine, where the system says it.
+    pub host: Option<String>,
     /// Model of the processor, where the system says it.
     pub processor: Option<String>,
     /// SIMD instructions that the renderer used.
@@ -100,13 +102,6 @@ impl Stopwatch {
     }
 }
 
-/// The processor as Linux names it.
-fn processor() -> Option<String> {
-    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
-    let line = text.lines().find(|line| line.starts_with("model name"))?;
-    Some(line.split_once(':')?.1.trim().to_owned())
-}
-
 fn digests(plan: &Plan) -> BTreeMap<String, Vec<String>> {
     let rows = plan.tables.iter().flat_map(|table| &table.rows);
     let of = rows.filter_map(|row| Some((row.id.clone(), row.data.as_ref()?)));
@@ -121,12 +116,14 @@ const BATCH_VARIABLES: [&str; 5] =
 impl Provenance {
     /// The circumstances of a call that starts now.
     pub fn starting(plan: &Plan) -> Self {
+        let machine = Machine::here();
         let variable = |name: &&str| std::env::var(name).ok().map(|value| ((*name).to_owned(), value));
         Self {
             program: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
             code: CodeVersions::CURRENT,
             binary: std::env::current_exe().ok().and_then(|path| file_digest(&path).ok()),
-            processor: processor(),
+            processor: machine.processor,
+            host: machine.host,
             platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
             simd: skinsplat_simd::level()
                 .unwrap_or_else(|_| skinsplat_simd::Level::detected())

@@ -1,22 +1,25 @@
 //! The results store: an append-only file of JSON lines, keyed by content.
 //!
 //! ```text
-//! {"header":{"schema":2,"plan":"9f2c…"}}
+//! {"header":{"schema":2,"plan":"9f2c…","machine":{"host":"n1","processor":"…"}}}
 //! {"frame":{"key":"51ab…","label":"…","outcome":{"scored":{…}},"seconds":{…}}}
 //! ```
 //!
 //! A record goes out in one write, so that a process killed at any byte leaves at most one torn line, at the end:
 //! reading drops it and [`Store::open`] cuts it off before it appends. Records are found by key, never by position. A
-//! failed frame is a record too and is tried again by the next run. A file may be opened for another plan: keys that
-//! both plans share are not computed twice, and a further header line says where the other plan began.
+//! failed frame is a record too and is tried again by the next run. A file may be opened for another plan or on another
+//! machine: keys that both plans share are not computed twice, and a further header line says where the other began.
 
+use super::Machine;
 use crate::experiment::{FrameRecord, Job, JobVariant, Outcome, Records};
 use serde::{Deserialize, Serialize};
-use std::collections::btree_map::Entry;
+use skinsplat_data::source;
+use std::collections::btree_map;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Version of the file format. Stores of other versions are refused: a run into a new folder makes their records anew.
 pub const SCHEMA: u32 = 2;
@@ -90,13 +93,31 @@ struct Header {
     schema: u32,
     /// Digest of the plan whose run appends from here on.
     plan: String,
+    /// The machine that appends from here on; stores of 0.1 do not say.
+    #[serde(default)]
+    machine: Machine,
 }
 
-/// What a file holds.
-struct Contents {
-    records: Records,
+/// A record of a store, and where it comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// The record.
+    pub record: FrameRecord,
+    /// Its line, from 1.
+    pub line: usize,
+    /// The machine that made it.
+    pub machine: Arc<Machine>,
+}
+
+/// What a file holds, in the order of its lines.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contents {
+    /// Every record.
+    pub entries: Vec<Entry>,
     /// Digest of the plan of the last header.
-    plan: Option<String>,
+    pub plan: Option<String>,
+    /// The machine of the last header.
+    machine: Arc<Machine>,
     /// Bytes up to the end of the last whole line.
     whole: u64,
 }
@@ -110,21 +131,26 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens or creates the store, drops a torn last line, and appends a header if the last one is of another plan.
+    /// Opens or creates the store, drops a torn last line, and appends a header if the last one is of another plan or of another
+    /// machine.
     ///
     /// # Errors
     /// If the file cannot be read or written, is not a store, or holds two results for one key.
-    pub fn open(path: &Path, plan: &str) -> Result<Self, Error> {
+    pub fn open(path: &Path, plan: &str, machine: &Machine) -> Result<Self, Error> {
         let io = |source| Error::Io { path: path.into(), source };
         let mut file = OpenOptions::new().read(true).append(true).create(true).open(path).map_err(io)?;
+        let locked = Locked::of(&file);
         let bytes = whole(&mut file).map_err(io)?;
         let contents = parse(&bytes, path)?;
+        let records = contents.records(path)?;
         if contents.whole < bytes.len() as u64 {
             cut(path, contents.whole).map_err(io)?;
         }
-        let mut store = Self { path: path.into(), file, records: contents.records };
-        if contents.plan.as_deref() != Some(plan) {
-            store.write(&[Line::Header(Header { schema: SCHEMA, plan: plan.into() })])?;
+        drop(locked);
+        let mut store = Self { path: path.into(), file, records };
+        if contents.plan.as_deref() != Some(plan) || *contents.machine != *machine {
+            let (plan, machine) = (plan.into(), machine.clone());
+            store.write(&[Line::Header(Header { schema: SCHEMA, plan, machine })])?;
         }
         Ok(store)
     }
@@ -167,12 +193,32 @@ impl Store {
             text.push('\n');
         }
         let io = |source| Error::Io { path: self.path.clone(), source };
+        let _locked = Locked::of(&self.file);
         let before = self.file.metadata().map_err(io)?.len();
         self.file.write_all(text.as_bytes()).and_then(|()| self.file.flush()).map_err(|source| {
             // Should even this fail, the next reader drops the torn line.
             let _ = cut(&self.path, before);
             io(source)
         })
+    }
+}
+
+/// A store that no other process changes meanwhile, where the file system has locks: the last line of another is then never
+/// taken for a torn one. Without them, appending in one write has to do.
+struct Locked(Option<File>);
+
+impl Locked {
+    fn of(file: &File) -> Self {
+        Self(file.try_clone().ok().filter(|file| file.lock().is_ok()))
+    }
+}
+
+impl Drop for Locked {
+    fn drop(&mut self) {
+        if let Some(file) = &self.0 {
+            // It ends with the file at the latest.
+            let _ = file.unlock();
+        }
     }
 }
 
@@ -201,11 +247,61 @@ fn cut(path: &Path, length: u64) -> io::Result<()> {
 /// # Errors
 /// If the file cannot be read, is not a store, or holds two results for one key.
 pub fn read(path: &Path) -> Result<Records, Error> {
-    // A pipe waits for a writer when it is opened.
-    let regular = std::fs::metadata(path).and_then(|metadata| refuse_devices(&metadata));
-    let bytes = regular.and_then(|()| whole(&mut File::open(path)?));
+    read_all(path)?.records(path)
+}
+
+/// Everything that a store holds, contradictions included, without touching it.
+///
+/// # Errors
+/// If the file cannot be read or is not a store.
+pub fn read_all(path: &Path) -> Result<Contents, Error> {
+    let bytes = source::open(path).and_then(|mut file| whole(&mut file));
     let bytes = bytes.map_err(|source| Error::Io { path: path.into(), source })?;
-    Ok(parse(&bytes, path)?.records)
+    parse(&bytes, path)
+}
+
+/// The results stores of a run's folder, sorted by name; none if there is no such folder.
+///
+/// # Errors
+/// A folder that cannot be listed.
+pub fn stores(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let io = |source| Error::Io { path: folder.into(), source };
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        // A pipe of such a name would be waited for.
+        if path.extension().is_some_and(|e| e == "jsonl") && path.is_file() {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}
+
+/// Writes records into a new store, those of one machine under a header of their own. An older store is replaced at once.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write_new<'a>(
+    path: &Path,
+    plan: &str,
+    records: impl IntoIterator<Item = (&'a Machine, &'a FrameRecord)>,
+) -> Result<(), skinsplat_data::Error> {
+    let mut by_machine: BTreeMap<&Machine, Vec<&FrameRecord>> = BTreeMap::new();
+    records.into_iter().for_each(|(machine, record)| by_machine.entry(machine).or_default().push(record));
+    skinsplat_data::atomic::write(path, |w| {
+        let mut line = |line: &Line| {
+            w.write_all((serde_json::to_string(line).expect("every field serialises") + "\n").as_bytes())
+        };
+        for (machine, records) in by_machine {
+            line(&Line::Header(Header { schema: SCHEMA, plan: plan.into(), machine: machine.clone() }))?;
+            records.into_iter().try_for_each(|record| line(&Line::Frame(Box::new(record.clone()))))?;
+        }
+        Ok(())
+    })
 }
 
 /// The records of several stores as one.
@@ -262,11 +358,11 @@ impl Clash {
 /// Adds a record: a score replaces a failure and repeats an equal score; a failure never replaces a score.
 fn insert(records: &mut Records, record: FrameRecord) -> Result<(), Box<Clash>> {
     let mut slot = match records.entry(record.key.clone()) {
-        Entry::Vacant(slot) => {
+        btree_map::Entry::Vacant(slot) => {
             slot.insert(record);
             return Ok(());
         }
-        Entry::Occupied(slot) => slot,
+        btree_map::Entry::Occupied(slot) => slot,
     };
     let known = slot.get();
     match (&known.outcome, &record.outcome) {
@@ -295,8 +391,8 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Contents, Error> {
     if !OPENING.as_bytes().starts_with(start) {
         return Err(invalid(1, "not a results store".into(), &format!("a line that begins with {OPENING}")));
     }
-    let mut contents = Contents { records: Records::new(), plan: None, whole: whole as u64 };
-    let mut scored_in: BTreeMap<String, usize> = BTreeMap::new();
+    let mut contents =
+        Contents { entries: Vec::new(), plan: None, machine: Arc::default(), whole: whole as u64 };
     let lines = bytes[..whole].split_inclusive(|&byte| byte == b'\n');
     for (number, line) in (1..).zip(lines) {
         let line: Line = serde_json::from_slice(line)
@@ -306,18 +402,32 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Contents, Error> {
                 let problem = format!("schema {}", header.schema);
                 return Err(invalid(number, problem, &format!("{SCHEMA}, which this program writes")));
             }
-            Line::Header(header) => contents.plan = Some(header.plan),
+            Line::Header(header) => {
+                contents.plan = Some(header.plan);
+                contents.machine = Arc::new(header.machine);
+            }
             Line::Frame(record) => {
-                let at = |line: usize| format!("{}:{line}", path.display());
-                let (key, scored) = (record.key.clone(), matches!(record.outcome, Outcome::Scored { .. }));
-                insert(&mut contents.records, *record).map_err(|clash| {
-                    clash.at([at(scored_in.get(&key).copied().unwrap_or_default()), at(number)])
-                })?;
-                if scored {
-                    scored_in.entry(key).or_insert(number);
-                }
+                let machine = contents.machine.clone();
+                contents.entries.push(Entry { record: *record, line: number, machine });
             }
         }
     }
     Ok(contents)
+}
+
+impl Contents {
+    /// The records by key.
+    fn records(&self, path: &Path) -> Result<Records, Error> {
+        let mut records = Records::new();
+        let mut scored_in: BTreeMap<&str, usize> = BTreeMap::new();
+        for Entry { record, line, .. } in &self.entries {
+            let at = |line: usize| format!("{}:{line}", path.display());
+            let first = scored_in.get(record.key.as_str()).copied().unwrap_or_default();
+            insert(&mut records, record.clone()).map_err(|clash| clash.at([at(first), at(*line)]))?;
+            if matches!(record.outcome, Outcome::Scored { .. }) {
+                scored_in.entry(&record.key).or_insert(*line);
+            }
+        }
+        Ok(records)
+    }
 }

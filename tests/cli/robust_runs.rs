@@ -57,6 +57,23 @@ fn a_damaged_avatar_is_made_again_and_that_is_said() {
 }
 
 #[test]
+fn a_folder_without_avatars_is_small_and_still_a_run() {
+    let desk = desk();
+    let all = run(&desk, &["--out", "run"]).exits(0, "everything is kept");
+    let curves = desk.read("run/curves.csv");
+    let none = run(&desk, &["--out", "run", "--keep", "none"]).exits(0, "no avatars");
+    assert_eq!(none.out, all.out);
+    let left = std::fs::read_dir(desk.path("run/avatars")).unwrap().map(|entry| entry.unwrap().path());
+    let left: Vec<PathBuf> = left.collect();
+    assert!(left.len() == 1 && left[0].extension().is_some_and(|e| e == "json"), "{left:?}");
+    assert_eq!(run(&desk, &["--out", "run"]).exits(0, "nothing is left to do").out, all.out);
+    assert_eq!(desk.read("run/curves.csv"), curves);
+    // What needs them makes them again, bit for bit.
+    run(&desk, &["--out", "run", "--fresh", "--images", "all"]).exits(0, "pictures");
+    assert_eq!(avatars(&desk, "ply").len(), 3);
+}
+
+#[test]
 fn a_slice_whose_frames_fail_is_incomplete() {
     let desk = desk();
     for image in ["image_0000.png", "image_0001.png", "image_0002.png"] {

@@ -4,8 +4,10 @@ use crate::args;
 use crate::program::Desk;
 use std::process::{Command, Stdio};
 
-const SUBCOMMANDS: [&str; 16] = [
+const SUBCOMMANDS: [&str; 18] = [
     "run",
+    "merge",
+    "batch",
     "compare",
     "plan",
     "report",
@@ -33,6 +35,8 @@ fn top_level_help() {
     Commands:
       run          Evaluate: make avatars, pose, render, score, and write the tables
       plan         Show what a run would do, without doing it
+      merge        Collect the slices of a run: the same tables as one run, byte for byte
+      batch        Print a script that runs the slices of a run on a cluster, and collects them
       report       Print the tables of a run again
       compare      Compare a run with an earlier one: what regressed, improved, is missing or new
       list         List experiments, datasets, strategies, recipes, protocols or metrics

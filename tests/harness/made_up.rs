@@ -43,7 +43,7 @@ pub(super) fn options() -> Options {
 pub(super) fn sequence(id: &str, role: Role, frames: usize) -> SequenceInfo {
     let frame = |time| FrameInfo { name: format!("image_{time:04}"), time, camera: 0 };
     let digest = format!("digest of {id}");
-    SequenceInfo { id: id.into(), role, digest, frames: (0..frames).map(frame).collect() }
+    SequenceInfo { id: id.into(), role, digest, frames: (0..frames).map(frame).collect(), image: None }
 }
 
 pub(super) fn subject(id: &str, capture: Capture, sequences: Vec<SequenceInfo>) -> SubjectInfo {

@@ -12,5 +12,6 @@ mod metrics;
 mod plans;
 mod poses;
 mod reports;
+mod slices;
 mod stores;
 mod verdicts;

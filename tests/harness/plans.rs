@@ -3,7 +3,7 @@
 use super::made_up::{figures, options, own_data, sequence, subject, table_7};
 use skinsplat::experiment::{
     AvatarRecipe, AvatarSource, AvatarState, Dataset, Experiment, FrameInfo, Options, Plan, PlannedAvatar,
-    Profile, Role, SequenceInfo, Shard, Source, SubjectInfo, Subset, TrainingFrames, plan,
+    Profile, Role, SequenceInfo, Source, SubjectInfo, Subset, TrainingFrames, plan,
 };
 use skinsplat_data::Capture;
 use skinsplat_data::key::canonical_json;
@@ -365,17 +365,4 @@ fn a_file_that_is_missing_or_broken_is_named_unless_a_fit_replaces_it() {
     assert_eq!(keys(&plan).last(), keys(&planned(&[with_file("fitted", None)], &[own_data(2)])).last());
     let key = |plan: &Plan| plan.jobs[2].variants[0].key.clone();
     assert_eq!(key(&plan), key(&fitted), "fitted as any other");
-}
-
-#[test]
-fn shards_of_a_plan_are_its_jobs() {
-    let plan = planned(&Experiment::embedded(), &[figures()]);
-    let mut positions = Vec::new();
-    for index in 1..=3 {
-        let jobs = plan.shard(Some(Shard::new(index, 3).unwrap()));
-        positions.extend(jobs.iter().map(|job| plan.jobs.iter().position(|other| other == *job).unwrap()));
-    }
-    positions.sort_unstable();
-    assert_eq!(positions, (0..plan.jobs.len()).collect::<Vec<_>>());
-    assert_eq!(plan.shard(None).len(), plan.jobs.len());
 }

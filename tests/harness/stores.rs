@@ -2,7 +2,8 @@
 
 use super::made_up::{figures, options, record, score, scored};
 use proptest::prelude::{Strategy, any, prop, prop_assert, prop_assert_eq, proptest};
-use skinsplat::experiment::{Experiment, FrameRecord, Job, Outcome, Records, Shard, plan};
+use skinsplat::experiment::{Experiment, FrameRecord, Job, Outcome, Plan, Records, Shard, plan};
+use skinsplat::run::Machine;
 use skinsplat::run::store::{self, Store, outstanding};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -25,7 +26,7 @@ fn failed(key: &str) -> FrameRecord {
 /// A store's bytes and the records in the order in which they were appended.
 fn written(records: &[FrameRecord]) -> Vec<u8> {
     let (_folder, path) = place();
-    let mut store = Store::open(&path, "plan").unwrap();
+    let mut store = Store::open(&path, "plan", &Machine::default()).unwrap();
     for record in records {
         store.append(std::slice::from_ref(record)).unwrap();
     }
@@ -41,14 +42,14 @@ fn what_is_appended_is_read_again() {
     let (_folder, path) = place();
     let identical = scored_at("identical images", f64::INFINITY);
     let precise = scored("precise", score("haha", 1.0 / 3.0, 0.1 + 0.2, Some(f64::MIN_POSITIVE)));
-    let mut store = Store::open(&path, "plan").unwrap();
+    let mut store = Store::open(&path, "plan", &Machine::default()).unwrap();
     store.append(&[identical.clone(), failed("b")]).unwrap();
     store.append(std::slice::from_ref(&precise)).unwrap();
     let expected = by_key(&[identical, failed("b"), precise]);
     assert_eq!(store.records(), &expected);
     assert_eq!(store::read(&path).unwrap(), expected);
     let before = std::fs::read(&path).unwrap();
-    assert_eq!(Store::open(&path, "plan").unwrap().into_records(), expected);
+    assert_eq!(Store::open(&path, "plan", &Machine::default()).unwrap().into_records(), expected);
     assert_eq!(std::fs::read(&path).unwrap(), before, "opening for the same plan writes nothing");
     assert_eq!(before.iter().filter(|&&byte| byte == b'\n').count(), 4);
 }
@@ -64,7 +65,7 @@ fn a_kill_at_any_byte_loses_at_most_the_torn_line() {
         let lines = bytes[..cut].iter().filter(|&&byte| byte == b'\n').count();
         let kept = &records[..lines.saturating_sub(1)];
         assert_eq!(store::read(&path).unwrap(), by_key(kept), "cut at {cut}");
-        let mut store = Store::open(&path, "plan").unwrap();
+        let mut store = Store::open(&path, "plan", &Machine::default()).unwrap();
         assert_eq!(store.records(), &by_key(kept), "cut at {cut}");
         for record in &records[kept.len()..] {
             store.append(std::slice::from_ref(record)).unwrap();
@@ -76,7 +77,7 @@ fn a_kill_at_any_byte_loses_at_most_the_torn_line() {
 #[test]
 fn equal_results_may_repeat_and_different_ones_may_not() {
     let (_folder, path) = place();
-    let mut store = Store::open(&path, "plan").unwrap();
+    let mut store = Store::open(&path, "plan", &Machine::default()).unwrap();
     store.append(&[scored_at("a", 20.0)]).unwrap();
     let mut slow = scored_at("a", 20.0);
     slow.seconds.render = 9.0;
@@ -92,7 +93,10 @@ fn equal_results_may_repeat_and_different_ones_may_not() {
     assert!(!store.records().contains_key("new"));
 
     let (_other_folder, other) = place();
-    Store::open(&other, "plan").unwrap().append(&[scored_at("a", 20.5), scored_at("b", 1.0)]).unwrap();
+    Store::open(&other, "plan", &Machine::default())
+        .unwrap()
+        .append(&[scored_at("a", 20.5), scored_at("b", 1.0)])
+        .unwrap();
     let error = store::merge([path.as_path(), other.as_path()]).unwrap_err();
     assert!(matches!(error, store::Error::Conflict { .. }), "{error}");
     let text = error.to_string();
@@ -108,7 +112,7 @@ fn equal_results_may_repeat_and_different_ones_may_not() {
 #[test]
 fn a_failure_is_replaced_by_a_score_and_never_replaces_one() {
     let (_folder, path) = place();
-    let mut store = Store::open(&path, "plan").unwrap();
+    let mut store = Store::open(&path, "plan", &Machine::default()).unwrap();
     for (next, expected) in [
         (failed("a"), failed("a")),
         (record("a", Outcome::Error("other".into())), record("a", Outcome::Error("other".into()))),
@@ -124,14 +128,27 @@ fn a_failure_is_replaced_by_a_score_and_never_replaces_one() {
 #[test]
 fn another_plan_keeps_the_records_and_adds_a_header() {
     let (_folder, path) = place();
-    Store::open(&path, "first").unwrap().append(&[scored_at("a", 20.0)]).unwrap();
-    assert_eq!(Store::open(&path, "second").unwrap().into_records(), by_key(&[scored_at("a", 20.0)]));
+    Store::open(&path, "first", &Machine::default()).unwrap().append(&[scored_at("a", 20.0)]).unwrap();
+    assert_eq!(
+        Store::open(&path, "second", &Machine::default()).unwrap().into_records(),
+        by_key(&[scored_at("a", 20.0)])
+    );
     let text = std::fs::read_to_string(&path).unwrap();
     let headers: Vec<&str> = text.lines().filter(|line| line.contains("header")).collect();
     assert_eq!(
         headers,
-        [r#"{"header":{"schema":2,"plan":"first"}}"#, r#"{"header":{"schema":2,"plan":"second"}}"#]
+        ["first", "second"].map(|plan| {
+            format!(
+                r#"{{"header":{{"schema":2,"plan":"{plan}","machine":{{"host":null,"processor":null}}}}}}"#
+            )
+        })
     );
+    // Nor does another machine.
+    let other = Machine { host: Some("n2".into()), processor: None };
+    Store::open(&path, "second", &other).unwrap().append(&[scored_at("b", 1.0)]).unwrap();
+    let contents = store::read_all(&path).unwrap();
+    let hosts: Vec<_> = contents.entries.iter().map(|entry| entry.machine.host.as_deref()).collect();
+    assert_eq!((hosts, contents.plan.as_deref()), (vec![None, Some("n2")], Some("second")));
 }
 
 #[test]
@@ -151,7 +168,9 @@ fn other_files_are_refused_and_left_alone() {
     ];
     for (text, message) in cases {
         std::fs::write(&path, &text).unwrap();
-        for error in [store::read(&path).unwrap_err(), Store::open(&path, "plan").unwrap_err()] {
+        for error in
+            [store::read(&path).unwrap_err(), Store::open(&path, "plan", &Machine::default()).unwrap_err()]
+        {
             let error = error.to_string();
             assert!(error.contains(store::FILE_NAME) && error.contains(message), "{error}");
         }
@@ -161,8 +180,12 @@ fn other_files_are_refused_and_left_alone() {
     assert!(error.contains("absent.jsonl"), "{error}");
 }
 
+fn planned() -> Plan {
+    plan(&Experiment::embedded(), &[figures()], &options()).unwrap()
+}
+
 fn jobs() -> Vec<Job> {
-    plan(&Experiment::embedded(), &[figures()], &options()).unwrap().jobs
+    planned().jobs
 }
 
 #[test]
@@ -187,8 +210,7 @@ proptest! {
     /// Against a model: what is left is what has no score, once, in order, with nothing else changed.
     #[test]
     fn what_is_left_is_what_has_no_score(outcomes in outcomes(), index in 1..4_usize) {
-        let jobs = jobs();
-        let shard = Shard::new(index, 3).unwrap();
+        let jobs = planned().shard(Some(Shard::new(index, 3).unwrap()));
         let mut records = Records::new();
         let keys: BTreeSet<&str> = jobs.iter().flat_map(|job| &job.variants).map(|v| v.key.as_str()).collect();
         for (key, outcome) in keys.iter().zip(&outcomes) {
@@ -198,10 +220,10 @@ proptest! {
                 _ => { records.insert((*key).to_owned(), scored_at(key, 20.0)); }
             }
         }
-        let left = outstanding(shard.slice(&jobs), &records);
+        let left = outstanding(&jobs, &records);
         let mut expected = Vec::new();
         let mut seen = BTreeSet::new();
-        for variant in shard.slice(&jobs).flat_map(|job| &job.variants) {
+        for variant in jobs.iter().flat_map(|job| &job.variants) {
             let open = records.get(&variant.key).is_none_or(|r| matches!(r.outcome, Outcome::Error(_)));
             if open && seen.insert(&variant.key) {
                 expected.push(variant.clone());
@@ -225,7 +247,7 @@ proptest! {
         let (_folder, path) = place();
         std::fs::write(&path, &bytes).unwrap();
         let whole = bytes.iter().rposition(|&b| b == b'\n').map_or(0, |last| last + 1);
-        match (store::read(&path), Store::open(&path, "plan")) {
+        match (store::read(&path), Store::open(&path, "plan", &Machine::default())) {
             (Ok(read), Ok(store)) => {
                 prop_assert_eq!(&read, store.records());
                 prop_assert!(std::fs::read(&path).unwrap().starts_with(&bytes[..whole]));

@@ -1,11 +1,10 @@
 //! Named arrays, whichever container holds them: an `.npz` archive or a pickled dictionary.
 
-use super::Error;
 use super::npy::Array;
 use super::npz::Archive;
 use super::pickle::{self, Pickle, Rows};
 use super::shapes::Extents;
-use std::fs::File;
+use super::{Error, source};
 use std::io::Read;
 use std::path::Path;
 
@@ -30,7 +29,7 @@ impl Arrays {
     pub fn open(path: &Path, what: &str) -> Result<Self, Error> {
         let mut start = Vec::new();
         let expected = "a .npz archive of arrays, or a pickled dictionary of them";
-        let opened = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
+        let opened = source::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
         opened.map_err(|cause| Error::read(path, what, expected, cause))?;
         let container = match pickle::is_pickle_file(path, &start) {
             true => Container::Pickle(Pickle::read(path, what)?),

@@ -1,9 +1,12 @@
-//! Writing a file so that a reader sees all of it or none: beside the target, then renamed.
+//! Writing a file so that a reader sees all of it or none: beside the target, then renamed. A program that is told to stop calls
+//! [`abandon`], and leaves nothing half written.
 
 use super::Error;
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// How the names of files begin that are not complete yet.
@@ -45,11 +48,27 @@ pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result
     written.map_err(|cause| Error::write(path, "file", cause))
 }
 
-fn beside(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
-    let folder = match path.parent() {
+/// Finds out whether [`write`] could write there, before work is done that would be lost: nothing is left behind.
+///
+/// # Errors
+/// As [`write`], but for a disk that fills up.
+pub fn check(path: &Path) -> Result<(), Error> {
+    let tried = match std::fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => Err(io::Error::from(io::ErrorKind::IsADirectory)),
+        Ok(metadata) if !metadata.is_file() => Ok(()),
+        _ => tempfile::Builder::new().prefix(UNFINISHED).tempfile_in(folder_of(path)).map(|_| ()),
+    };
+    tried.map_err(|cause| Error::write(path, "file", cause))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
-    };
+    }
+}
+
+fn beside(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(UNFINISHED);
     #[cfg(unix)]
@@ -58,10 +77,37 @@ fn beside(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let file = builder.tempfile_in(folder)?;
-    filled(file.as_file(), fill)?;
-    file.persist(path).map_err(|e| e.error)?;
-    Ok(())
+    let (file, name) = {
+        let mut unfinished = unfinished();
+        let file = builder.tempfile_in(folder_of(path))?;
+        let name = file.path().to_owned();
+        unfinished.insert(name.clone());
+        (file, name)
+    };
+    let written = filled(file.as_file(), fill).and_then(|()| {
+        let _unfinished = unfinished();
+        file.persist(path).map(|_| ()).map_err(|e| e.error)
+    });
+    unfinished().remove(&name);
+    written
+}
+
+/// Files of this process that are not complete yet.
+static UNFINISHED_FILES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED_FILES.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes every file that this process has not completed, and lets it begin and complete no other: for a process that ends
+/// while its threads are still writing. Keep what is returned until it does.
+pub fn abandon() -> impl Drop {
+    let unfinished = unfinished();
+    for path in unfinished.iter() {
+        // One that cannot be removed is swept later.
+        let _ = std::fs::remove_file(path);
+    }
+    unfinished
 }
 
 fn filled(file: &File, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
@@ -108,6 +154,16 @@ mod tests {
         sweep(&folder.path().join("missing"));
         let left = |name| folder.path().join(name).exists();
         assert_eq!([left(".writing-a"), left(".writing-b"), left("kept")], [false, true, true]);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_known_before() {
+        let folder = tempfile::tempdir().unwrap();
+        for path in [folder.path().join("missing/out.bin"), folder.path().to_path_buf()] {
+            assert!(matches!(check(&path), Err(Error::Write { .. })));
+        }
+        check(&folder.path().join("out.bin")).unwrap();
+        assert_eq!(entries(folder.path()), 0);
     }
 
     #[test]

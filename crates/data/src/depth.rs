@@ -1,8 +1,7 @@
 //! Depth maps: TIFF files of one channel of floats.
 
-use super::Error;
+use super::{Error, source};
 use skinsplat_core::scene::camera;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use tiff::ColorType;
@@ -29,7 +28,7 @@ pub struct Depth {
 pub fn load(path: &Path) -> Result<Depth, Error> {
     const EXPECTED: &str = "a TIFF file with one channel of floats";
     let broken = |cause: tiff::TiffError| Error::invalid(path, "depth", one_line(&cause), EXPECTED);
-    let file = File::open(path).map_err(|cause| Error::read(path, "depth", EXPECTED, cause))?;
+    let file = source::open(path).map_err(|cause| Error::read(path, "depth", EXPECTED, cause))?;
     let length = file.metadata().map_err(|cause| Error::read(path, "depth", EXPECTED, cause))?.len();
     let mut decoder = Decoder::new(BufReader::new(file)).map_err(broken)?;
     let (width, height) = decoder.dimensions().map_err(broken)?;

@@ -1,7 +1,8 @@
 //! What can go wrong between a file and a scene type.
 
+use super::source;
 use skinsplat_core::scene::SceneError;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// An error of the data layer. Every variant names the file, the field in it and what was expected, in one line.
@@ -109,23 +110,9 @@ impl Error {
     }
 }
 
-/// What a pipe or device may deliver: such a source has no length of its own, and some never end.
-const MAX_STREAM: u64 = 1 << 32;
-
-/// Reads a whole file, or a pipe to its end.
+/// Reads a whole file, or an open stream to its end.
 pub fn read_bytes(path: &Path, field: &str, expected: &str) -> Result<Vec<u8>, Error> {
-    let read = || {
-        let file = std::fs::File::open(path)?;
-        let length = file.metadata()?.len();
-        let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
-        if file.metadata()?.is_file() {
-            (&file).read_to_end(&mut bytes)?;
-        } else if (&file).take(MAX_STREAM).read_to_end(&mut bytes)? as u64 == MAX_STREAM {
-            return Err(io::Error::new(io::ErrorKind::FileTooLarge, "no end within 4 GiB"));
-        }
-        Ok(bytes)
-    };
-    read().map_err(|cause| Error::read(path, field, expected, cause))
+    source::read(path).map_err(|cause| Error::read(path, field, expected, cause))
 }
 
 /// Reads a whole UTF-8 file.

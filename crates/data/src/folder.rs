@@ -198,13 +198,19 @@ fn frames_of(
     };
     let present = |i: usize, field: &str, path: &str| {
         let file = folder.join(path);
-        if file.is_file() {
+        // Sequences of a subject may share images.
+        let inside = listing::stays_inside(path, 1);
+        if inside && file.is_file() {
             return Ok(file);
         }
         Err(Error::invalid(
             listing,
             format!("frames[{i}].{field}"),
-            format!("no file {path}"),
+            if inside {
+                format!("no file {path}")
+            } else {
+                format!("{path} leads out of the subject's folder")
+            },
             "a file of the sequence",
         ))
     };

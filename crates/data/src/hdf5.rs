@@ -4,8 +4,8 @@
 //! deflate, shuffle, fletcher32 and LZF. What is checked here first is that a file can hold what it declares, so that no
 //! count of a damaged file becomes memory.
 
-use super::Error;
 use super::npy::{Array, MAX_VALUES};
+use super::{Error, source};
 use hdf5_pure::{ChunkCacheConfig, DType, Dataset, File, FileAccessProperties, Layout};
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,7 @@ impl Hdf5 {
     /// # Errors
     /// A file that cannot be read or is no HDF5 file.
     pub fn open(path: &Path, what: &str) -> Result<Self, Error> {
-        std::fs::metadata(path).map_err(|cause| Error::read(path, what, "an HDF5 file", cause))?;
+        source::open(path).map_err(|cause| Error::read(path, what, "an HDF5 file", cause))?;
         let cache = ChunkCacheConfig::default().with_max_bytes(CACHE);
         let properties = FileAccessProperties::new().with_chunk_cache(cache);
         let file = File::open_streaming_with_options(path, properties)

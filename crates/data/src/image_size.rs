@@ -1,10 +1,9 @@
 //! The size of an image, from its header.
 
-use super::{Error, frames};
+use super::{Error, frames, source};
 use image::metadata::Orientation;
 use image::{ImageDecoder, ImageReader};
 use skinsplat_core::scene::camera;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -19,7 +18,7 @@ pub(crate) fn of(path: &Path) -> Result<[u32; 2], Error> {
         return Ok([image.width() as u32, image.height() as u32]);
     }
     let broken = |cause: &dyn std::fmt::Display| Error::invalid(path, "image", cause.to_string(), EXPECTED);
-    let file = File::open(path).map_err(|cause| Error::read(path, "image", EXPECTED, cause))?;
+    let file = source::open(path).map_err(|cause| Error::read(path, "image", EXPECTED, cause))?;
     let reader = ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(|e| broken(&e))?;
     let mut decoder = reader.into_decoder().map_err(|e| broken(&e))?;
     let (width, height) = decoder.dimensions();

@@ -53,6 +53,7 @@ mod reduce;
 pub mod select;
 pub mod sequence;
 mod shapes;
+pub mod source;
 mod sourced;
 pub mod splatting_avatar;
 pub mod torch;

@@ -6,7 +6,7 @@ use super::Error;
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// The files of a folder that have one of the extensions, in the order of their numbers. `field` is what they are for ("images").
 ///
@@ -129,6 +129,21 @@ fn rank(path: &Path, extensions: &[&str]) -> Option<usize> {
     extensions.iter().position(|extension| own.eq_ignore_ascii_case(extension))
 }
 
+/// Whether a path that a document names stays below a folder, or so many above it. Lexically: links may lead where they like,
+/// since whoever set them could.
+pub(crate) fn stays_inside(path: &str, above: usize) -> bool {
+    let mut depth = above;
+    for part in Path::new(path).components() {
+        match part {
+            Component::Normal(_) => depth += 1,
+            Component::CurDir => {}
+            Component::ParentDir if depth > 0 => depth -= 1,
+            Component::ParentDir | Component::RootDir | Component::Prefix(_) => return false,
+        }
+    }
+    true
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,5 +183,20 @@ mod tests {
         write("m_02.npy");
         let error = numbered(folder.path(), "masks", &["npy", "png"]).unwrap_err();
         assert!(error.to_string().contains("frame 2 too"), "{error}");
+    }
+
+    #[test]
+    fn paths_of_documents_stay_where_they_belong() {
+        for (path, above, inside) in [
+            ("images/a.png", 0, true),
+            ("./images/../a.png", 0, true),
+            ("../images/a.png", 1, true),
+            ("../images/a.png", 0, false),
+            ("../../a.png", 1, false),
+            ("images/../../a.png", 0, false),
+            ("/etc/passwd", 3, false),
+        ] {
+            assert_eq!(stays_inside(path, above), inside, "{path}");
+        }
     }
 }

@@ -254,7 +254,9 @@ impl<'a> Models<'a> {
         let Some(name) = name else {
             return Err(Error::invalid(source, "model", "missing", "a body model, named here or given"));
         };
-        self.places().iter().map(|place| place.join(name)).find(|path| path.is_file()).ok_or_else(|| {
+        let found = || self.places().iter().map(|place| place.join(name)).find(|path| path.is_file());
+        let inside = super::listing::stays_inside(name, 0);
+        inside.then(found).flatten().ok_or_else(|| {
             let expected = "a file in models/ of the subject's folder or of one of the two above it";
             Error::invalid(source, "model", format!("{name} not found"), expected)
         })

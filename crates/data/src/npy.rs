@@ -3,9 +3,8 @@
 //! Parsed here and not by the `npyz` crate, which the tests compare with: that one allocates the header length that a file
 //! claims, overflows on the product of an absurd shape and recurses as deep as the header's brackets nest.
 
-use super::{Error, atomic};
+use super::{Error, atomic, source};
 use skinsplat_core::scene::SceneError;
-use std::fs::File;
 use std::io::{BufReader, Read, Write};
 use std::path::Path;
 
@@ -47,7 +46,7 @@ pub fn read(path: &Path) -> Result<Array, Error> {
 /// # Errors
 /// As [`read`].
 pub fn read_with_header(path: &Path) -> Result<(Header, Array), Error> {
-    let file = File::open(path).map_err(|cause| Error::read(path, "file", "a .npy array", cause))?;
+    let file = source::open(path).map_err(|cause| Error::read(path, "file", "a .npy array", cause))?;
     let mut reader = BufReader::new(file);
     let scene = |e: SceneError| Error::scene(path, e);
     let header = read_header(&mut reader, "array").map_err(scene)?;

@@ -1,8 +1,8 @@
 //! NumPy `.npz` archives: named arrays, read one at a time and checked against the shape that is expected of them.
 
-use super::Error;
 use super::npy::{self, Array, Header};
 use super::shapes::Extents;
+use super::{Error, source};
 use skinsplat_core::scene::SceneError;
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -31,7 +31,7 @@ impl Archive {
     /// # Errors
     /// A file that cannot be read or is no zip archive.
     pub fn open(path: &Path, what: &str) -> Result<Self, Error> {
-        let open = || ZipArchive::new(BufReader::new(File::open(path)?));
+        let open = || ZipArchive::new(BufReader::new(source::open(path)?));
         let inner =
             open().map_err(|cause| Error::read(path, what, "a .npz archive of arrays", cause.into()))?;
         Ok(Self { path: path.to_owned(), inner, extents: Extents::default() })

@@ -128,8 +128,8 @@ fn number(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }
 
-/// Text on one line that no spreadsheet runs as a formula.
-fn text(text: &str) -> String {
+/// A field that is text: on one line, and nothing that a spreadsheet runs as a formula.
+pub fn text(text: &str) -> String {
     let text = visible(text);
     let signed = text.starts_with(['+', '-']) && text.contains(char::is_alphabetic);
     let formula = text.starts_with(['=', '@']) || (signed && text.parse::<f64>().is_err());

@@ -17,7 +17,7 @@ pub mod text;
 pub use best::mark_best;
 pub use cell::{Cell, Content};
 pub use column::{Align, Column, Direction};
-pub use csv::{csv, csv_by_cell};
+pub use csv::{csv, csv_by_cell, text as csv_text};
 pub use digits::Digits;
 pub use formats::{FORMATS, Format};
 pub use json::{json, to_json};

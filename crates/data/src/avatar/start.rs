@@ -1,6 +1,6 @@
 //! What tells formats apart: how a file starts, and what an archive lists.
 
-use super::super::Error;
+use super::super::{Error, source};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ impl Start {
     pub(super) fn of(path: &Path) -> Result<Self, Error> {
         let unreadable = |cause| Error::read(path, "avatar", super::EXPECTED, cause);
         let mut bytes = Vec::new();
-        let file = File::open(path).map_err(unreadable)?;
+        let file = source::open(path).map_err(unreadable)?;
         let is_file = file.metadata().map_err(unreadable)?.is_file();
         if is_file {
             file.take(LENGTH).read_to_end(&mut bytes).map_err(unreadable)?;
@@ -51,7 +51,7 @@ impl Start {
 }
 
 fn entries(path: &Path) -> Vec<String> {
-    let open = || ZipArchive::new(BufReader::new(File::open(path)?));
+    let open = || ZipArchive::new(BufReader::new(source::open(path)?));
     let names = |archive: ZipArchive<BufReader<File>>| {
         archive.file_names().flatten().map(std::borrow::Cow::into_owned).collect()
     };

@@ -5,9 +5,8 @@ mod smpl;
 
 pub use shape::shape;
 
-use super::{Error, gltf, pickle};
+use super::{Error, gltf, pickle, source};
 use skinsplat_core::scene::Body;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -76,7 +75,7 @@ impl Format {
         let expected = "an .npz, .pkl, .glb or .gltf file";
         let unreadable = |cause| Error::read(path, "file", expected, cause);
         let mut start = Vec::new();
-        File::open(path).map_err(unreadable)?.take(64).read_to_end(&mut start).map_err(unreadable)?;
+        source::open(path).map_err(unreadable)?.take(64).read_to_end(&mut start).map_err(unreadable)?;
         let text = start.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&start).trim_ascii_start();
         if start.starts_with(b"PK") {
             Ok(Self::Npz)

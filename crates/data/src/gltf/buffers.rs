@@ -1,6 +1,6 @@
 //! A glTF document with its buffers, and accessors that are checked before they are read.
 
-use super::super::{Error, error};
+use super::super::{Error, error, source};
 use super::text;
 use ::gltf::accessor::{DataType, Dimensions, Item, Iter};
 use ::gltf::json::validation::Checked;
@@ -100,10 +100,7 @@ impl Source {
         }
         let path = self.folder.join(relative);
         let read = || {
-            let file = std::fs::metadata(&path).and_then(|about| match about.is_file() {
-                true => std::fs::File::open(&path),
-                false => Err(io::Error::new(io::ErrorKind::InvalidInput, "no regular file")),
-            })?;
+            let file = source::open(&path)?;
             let mut bytes = Vec::new();
             file.take(limit as u64).read_to_end(&mut bytes)?;
             Ok(bytes)

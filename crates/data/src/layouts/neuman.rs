@@ -148,7 +148,8 @@ fn captures(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Registered>, E
     }
     let images = folder.join("images");
     let present = listing::files(&images, "images", &["png", "jpg", "jpeg"])?;
-    if let Some(missing) = captures.iter().find(|capture| !images.join(&capture.name).is_file()) {
+    let there = |name: &str| listing::stays_inside(name, 0) && images.join(name).is_file();
+    if let Some(missing) = captures.iter().find(|capture| !there(&capture.name)) {
         let problem = format!("no file {}", missing.name);
         return Err(Error::invalid(images, "images", problem, "the registered images of sparse/images.txt"));
     }

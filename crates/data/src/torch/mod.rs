@@ -8,7 +8,7 @@ mod element;
 
 use super::npy::Array;
 use super::pickle::{Field, Pickle, TensorPlace};
-use super::{Error, npy};
+use super::{Error, npy, source};
 use element::Element;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -51,7 +51,7 @@ impl Checkpoint {
     /// A file that is no archive of torch, or whose pickle names what is not read.
     pub fn open(path: &Path, what: &str) -> Result<Self, Error> {
         let expected = "a torch file (an archive with data.pkl)";
-        let open = || ZipArchive::new(BufReader::new(File::open(path)?));
+        let open = || ZipArchive::new(BufReader::new(source::open(path)?));
         let mut archive = open().map_err(|cause| Error::read(path, what, expected, cause.into()))?;
         let described = |name: std::borrow::Cow<'_, str>| name.strip_suffix("data.pkl").map(str::to_owned);
         let root = archive.file_names().flatten().find_map(described);
