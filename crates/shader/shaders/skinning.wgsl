@@ -244,22 +244,67 @@ fn average_of_two(p: vec4<f32>, u: f32, q: vec4<f32>, v: f32) -> vec4<f32> {
 
 // 1 - trace(A^2), of unit trace, at which A^2 has rank one to rounding.
 const RANK_ONE: f32 = 2.0e-4;
-// More squarings would double the rounding of a tie into an answer.
+// After these, eigenvalues that are told apart at all by less than a millionth are in the same plane.
 const SQUARINGS: u32 = 18u;
 
-// Any number of joints: A^(2^k) until it is q q^T. Where the two largest eigenvalues are too close for that, it is the
-// projection on their plane: the average nearest to the heaviest joint.
+// The column of `plane` that lies farthest off u, made orthogonal to u and normalised.
+fn beside(plane: Symmetric, u: vec4<f32>) -> vec4<f32> {
+    let b = plane.between;
+    let w = plane.beside_w;
+    let x = vec4<f32>(plane.diagonal.x, b.x, b.y, w.x);
+    let y = vec4<f32>(b.x, plane.diagonal.y, b.z, w.y);
+    let z = vec4<f32>(b.y, b.z, plane.diagonal.z, w.z);
+    let last = vec4<f32>(w.x, w.y, w.z, plane.diagonal.w);
+    let off_y = y - dot(y, u) * u;
+    let off_z = z - dot(z, u) * u;
+    let off_w = last - dot(last, u) * u;
+    var best = x - dot(x, u) * u;
+    if dot(off_y, off_y) > dot(best, best) {
+        best = off_y;
+    }
+    if dot(off_z, off_z) > dot(best, best) {
+        best = off_z;
+    }
+    if dot(off_w, off_w) > dot(best, best) {
+        best = off_w;
+    }
+    let unit = normalized_or(best, vec4<f32>(0.0));
+    return normalized_or(unit - dot(unit, u) * u, vec4<f32>(0.0));
+}
+
+// The leading eigenvector of A within a plane (a multiple of its projection): a 2x2 problem over u, the unit vector of the plane
+// nearest to the heaviest joint, and v beside it. If the two eigenvalues cannot be told apart it is u.
+fn leading_in_plane(a: Symmetric, plane: Symmetric, heaviest: vec4<f32>) -> vec4<f32> {
+    let u = normalized_or(applied(plane, heaviest), heaviest);
+    let v = beside(plane, u);
+    let of_v = applied(a, v);
+    let uu = dot(u, applied(a, u));
+    let vv = dot(v, of_v);
+    let half = 0.5 * (uu - vv);
+    let across = dot(u, of_v);
+    let rho = sqrt(half * half + across * across);
+    if !(2.0 * rho > 16.0 * EPSILON * (0.5 * (uu + vv) + rho)) {
+        return u;
+    }
+    if half >= 0.0 {
+        return normalized_or((rho + half) * u + across * v, u);
+    }
+    return normalized_or(across * u + (rho - half) * v, u);
+}
+
+// Any number of joints: A^(2^k) until it is q q^T, or until what is left is a plane whose two eigenvalues are close.
 fn average_of_many(outer: Symmetric, heaviest: vec4<f32>) -> vec4<f32> {
-    var a = scaled(outer, 1.0 / trace(outer));
+    let a = scaled(outer, 1.0 / trace(outer));
+    var power = a;
     for (var k = 0u; k < SQUARINGS; k += 1u) {
-        let square = squared(a);
+        let square = squared(power);
         let t = trace(square);
-        a = scaled(square, 1.0 / t);
+        power = scaled(square, 1.0 / t);
         if abs(1.0 - t) <= RANK_ONE {
-            return normalized_or(largest_column(a), heaviest);
+            return normalized_or(largest_column(power), heaviest);
         }
     }
-    return normalized_or(applied(a, heaviest), heaviest);
+    return leading_in_plane(a, power, heaviest);
 }
 
 // At most two joints.

@@ -61,20 +61,21 @@ fn unit(q: Quaternion<f32>) -> Quaternion<f32> {
     rotation::normalize(q.map(f64::from)).map_or([1.0, 0.0, 0.0, 0.0], |q| q.map(|c| c as f32))
 }
 
-/// Blends of four influences (two sets of four for `influence_sets` 2): a fifth each of bones near one another, of any bones, of
-/// two bones at any angle, of two bones close to half a turn apart, and of three or more whose two largest eigenvalues are
-/// close. Signs of quaternions are random, weights are not divided by their sum.
+/// Blends of four influences (two sets of four for `influence_sets` 2): a sixth each of bones near one another, of any bones, of
+/// two bones at any angle, of two bones close to half a turn apart, of three that are, and of three or more whose two largest
+/// eigenvalues are close. Signs of quaternions are random, weights are not divided by their sum.
 pub fn blends(count: usize, influence_sets: usize, seed: u64) -> Batch {
     let mut draw = Draw(SplitMix64::new(seed));
     let mut batch = Batch { influence_sets, ..Batch::new([0.4, 0.3, -3.0]) };
     for case in 0..count {
         let most = 4 * influence_sets;
         let many = 3 + draw.0.below(most - 2);
-        let bones = match case % 5 {
-            0 => near(&mut draw, 1 + case / 5 % most),
+        let bones = match case % 6 {
+            0 => near(&mut draw, 1 + case / 6 % most),
             1 => any(&mut draw, many),
             2 => any(&mut draw, 2),
             3 => half_a_turn_apart(&mut draw),
+            4 => three_alike(&mut draw),
             _ => close_eigenvalues(&mut draw, many),
         };
         let (mut joints, mut weights) = (Vec::new(), Vec::new());
@@ -110,6 +111,18 @@ fn half_a_turn_apart(draw: &mut Draw) -> Bones {
     let q = rotation::multiply(unit([draw.small(6.0), x, y, z]), p);
     let (weight, apart) = (0.2 + draw.unit(), draw.small(6.0));
     vec![(p, weight), (unit(q), weight * (1.0 - 0.5 * apart))]
+}
+
+/// Three bones, each half a turn from the others, of weights close to one another.
+fn three_alike(draw: &mut Draw) -> Bones {
+    let p = draw.rotation();
+    let (weight, apart, further) = (0.2 + draw.unit(), draw.small(6.0), draw.small(6.0));
+    let about = |axis: usize| {
+        let mut turn = [0.0; 4];
+        turn[axis] = 1.0;
+        rotation::multiply(turn, p)
+    };
+    vec![(p, weight), (about(1), weight * (1.0 - 0.5 * apart)), (about(3), weight * (1.0 - 0.5 * further))]
 }
 
 /// Two bones as above, and others whose weights are as small as what tells the two apart.

@@ -56,15 +56,18 @@ const CLASSES: [f64; 6] = [0.1, 1e-2, 1e-3, 1e-4, 1e-5, 0.0];
 /// The number by which Gaussians are classed: what decides how much rounding is magnified.
 fn decisive(batch: &Batch, i: usize, rotation: Rotation) -> f64 {
     match rotation {
-        Rotation::TwoBones | Rotation::ClosedForm | Rotation::Power => reference::gap(batch, i, rotation),
+        Rotation::TwoBones | Rotation::ClosedForm => reference::gap(batch, i, rotation),
+        Rotation::Power => reference::left_by_steps(batch, i),
         Rotation::AlignedSum | Rotation::DualQuaternion => reference::surest_side(batch, i),
     }
 }
 
-/// What decides, in words.
+/// What decides, in a word: the relative gap of the eigenvalues, what the steps leave of the heaviest joint, the cosine that says on
+/// which side a joint lies.
 pub fn decisive_name(rotation: Rotation) -> &'static str {
     match rotation {
-        Rotation::TwoBones | Rotation::ClosedForm | Rotation::Power => "gap",
+        Rotation::TwoBones | Rotation::ClosedForm => "gap",
+        Rotation::Power => "left",
         Rotation::AlignedSum | Rotation::DualQuaternion => "cosine",
     }
 }

@@ -45,6 +45,12 @@ impl Bones {
         bones
     }
 
+    /// The first of the joints of largest weight.
+    fn heaviest(&self) -> Option<Quaternion<f64>> {
+        let largest = self.weights.iter().copied().fold(0.0, f64::max);
+        self.weights.iter().position(|&w| w == largest).map(|k| self.quats[k])
+    }
+
     /// Eq. 6.
     fn blended_mean(&self, p: [f64; 3]) -> [f64; 3] {
         let total: f64 = self.weights.iter().sum();
@@ -103,13 +109,31 @@ pub fn gap(batch: &Batch, i: usize, choice: Rotation) -> f64 {
     average(&bones.quats, &bones.weights, Solver::ClosedForm).map_or(1.0, |average| average.gap)
 }
 
+/// The length of (A / λ1)ⁿ times the heaviest joint's quaternion: what n power steps leave of it, so one over how much they magnify
+/// their rounding.
+pub fn left_by_steps(batch: &Batch, i: usize) -> f64 {
+    let bones = Bones::new(batch, i, Rotation::Power);
+    let applied = |v: Quaternion<f64>| {
+        let mut sum = [0.0; 4];
+        for (q, w) in bones.quats.iter().zip(&bones.weights) {
+            let along = w * dot4(*q, v);
+            (0..4).for_each(|k| sum[k] += along * q[k]);
+        }
+        sum
+    };
+    let Some(best) = average_rotation(&bones.quats, &bones.weights, Solver::ClosedForm) else { return 1.0 };
+    let largest = dot4(best, applied(best));
+    let Some(heaviest) = bones.heaviest() else { return 1.0 };
+    let last = (0..batch.power_steps).fold(heaviest, |v, _| applied(v).map(|c| c / largest));
+    dot4(last, last).sqrt()
+}
+
 /// The smallest |cosine| between the heaviest joint's quaternion and another one's: how sure the sign is that an aligned sum
 /// gives to it.
 pub fn surest_side(batch: &Batch, i: usize) -> f64 {
     let bones = Bones::new(batch, i, Rotation::AlignedSum);
-    let largest = bones.weights.iter().copied().fold(0.0, f64::max);
-    let Some(heaviest) = bones.weights.iter().position(|&w| w == largest) else { return 1.0 };
-    let cosines = bones.quats.iter().map(|&q| dot4(q, bones.quats[heaviest]).abs());
+    let Some(heaviest) = bones.heaviest() else { return 1.0 };
+    let cosines = bones.quats.iter().map(|&q| dot4(q, heaviest).abs());
     cosines.fold(1.0, f64::min)
 }
 

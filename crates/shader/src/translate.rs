@@ -5,6 +5,7 @@ use naga::back::{glsl, hlsl, msl, spv};
 use naga::proc::BoundsCheckPolicies;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{Module, ResourceBinding, ShaderStage};
+use sha2::{Digest, Sha256};
 use std::fmt;
 
 /// A file of `translations/`.
@@ -42,8 +43,9 @@ const BINDINGS: [(u32, u32); 13] =
     [(0, 0), (0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (0, 6), (0, 7), (0, 8), (0, 9), (1, 0), (1, 1), (1, 2)];
 
 /// Every file: `skinning.hlsl` (shader model 5.1, a register space per group), `skinning.metal` (MSL 2.0, buffers 0 to 12 in the
-/// order of groups and bindings), `skinning.spv` (SPIR-V 1.3, all entry points), `glsl/ENTRY_POINT.comp` (GLSL 4.30, bindings as in MSL).
-/// Indices are not checked: a joint that is not there is the caller's fault.
+/// order of groups and bindings; 13, lengths of arrays, is never read), `skinning.spv` (SPIR-V 1.3, all entry points), `glsl/ENTRY_POINT.comp` (GLSL 4.30, bindings as in MSL).
+/// `SOURCE.sha256` is the source's digest. Indices are not
+/// checked: a joint that is not there is the caller's fault.
 ///
 /// # Errors
 /// The source is no valid WGSL, or a language lacks something.
@@ -57,6 +59,8 @@ pub fn translations() -> Result<Vec<Translation>, TranslateError> {
         text("skinning.metal", headed(&msl(&module, &info)?)),
         Translation { path: "skinning.spv".to_owned(), bytes: spirv(&module, &info)? },
     ];
+    let digest: String = Sha256::digest(SKINNING).iter().map(|byte| format!("{byte:02x}")).collect();
+    files.push(text("SOURCE.sha256", format!("{digest}  skinning.wgsl\n")));
     for entry_point in entry_points() {
         let source = glsl(&module, &info, &entry_point)?;
         // The version has to be the first line.
@@ -90,7 +94,12 @@ fn msl(module: &Module, info: &ModuleInfo) -> Result<String, TranslateError> {
         let target = msl::BindTarget { buffer: Some(slot as u8), mutable: true, ..Default::default() };
         (ResourceBinding { group, binding }, target)
     });
-    let resources = msl::EntryPointResources { resources: resources.collect(), ..Default::default() };
+    // naga hands the lengths of arrays to every entry point, read or not: here nothing reads them.
+    let resources = msl::EntryPointResources {
+        resources: resources.collect(),
+        sizes_buffer: Some(BINDINGS.len() as u8),
+        ..Default::default()
+    };
     let options = msl::Options {
         lang_version: (2, 0),
         per_entry_point_map: entry_points().into_iter().map(|name| (name, resources.clone())).collect(),
