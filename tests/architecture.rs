@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const MODULES: [&str; 4] = ["datasets", "experiment", "run", "report"];
 
 /// The crates, and what each may be built on. Tests and examples may use more.
-const CRATES: [(&str, &[&str]); 16] = [
+const CRATES: [(&str, &[&str]); 17] = [
     ("core", &[]),
     ("simd", &[]),
     ("table", &[]),

@@ -336,6 +336,52 @@ fn power_steps(blend: Blend, steps: u32) -> vec4<f32> {
     return v;
 }
 
+// ---- Sums of quaternions and of dual quaternions -----------------------------------------------------------------------
+
+// sum +-w q, and twice the dual part: sum +-w t q.
+struct Sum {
+    real: vec4<f32>,
+    dual: vec4<f32>,
+}
+
+// Takes one influence in, on the side of the reference. Weights that are not positive do not count.
+fn take_aligned(
+    sum: ptr<function, Sum>,
+    rotation: vec4<f32>,
+    translation: vec3<f32>,
+    weight: f32,
+    reference: vec4<f32>,
+) {
+    if !(weight > 0.0) {
+        return;
+    }
+    let signed = select(weight, -weight, is_opposite(rotation, reference));
+    (*sum).real += signed * rotation;
+    (*sum).dual += signed * multiply(vec4<f32>(translation, 0.0), rotation);
+}
+
+// The normalised sum of quaternions.
+fn aligned_sum(blend: Blend, sum: Sum) -> vec4<f32> {
+    if blend.bones < 2u {
+        return blend.heaviest;
+    }
+    return normalized_or(sum.real, blend.heaviest);
+}
+
+struct Motion {
+    rotation: vec4<f32>,
+    translation: vec3<f32>,
+}
+
+// Dual quaternions, divided by the length of the real part.
+fn dual_quaternion(blend: Blend, sum: Sum) -> Motion {
+    if blend.bones == 0u {
+        return Motion(IDENTITY, vec3<f32>(0.0));
+    }
+    let translation = multiply(sum.dual, conjugate(sum.real)).xyz / dot(sum.real, sum.real);
+    return Motion(normalized_or(sum.real, blend.heaviest), translation);
+}
+
 // ---- Shape -------------------------------------------------------------------------------------------------------------
 
 struct Covariance {
@@ -548,64 +594,18 @@ fn gathered_two(i: u32) -> Blend {
     return blend;
 }
 
-// A weight with the sign that brings its joint to the side of the reference, 0 if it does not count.
-fn signed_weight(joint: u32, weight: f32, reference: vec4<f32>) -> f32 {
-    if !(weight > 0.0) {
-        return 0.0;
-    }
-    return select(weight, -weight, is_opposite(joints[joint].rotation, reference));
-}
-
-fn signed_weights(joint: vec4<u32>, weight: vec4<f32>, reference: vec4<f32>) -> vec4<f32> {
-    return vec4<f32>(
-        signed_weight(joint.x, weight.x, reference),
-        signed_weight(joint.y, weight.y, reference),
-        signed_weight(joint.z, weight.z, reference),
-        signed_weight(joint.w, weight.w, reference),
-    );
-}
-
-// The normalised sum of quaternions on the side of the heaviest joint.
-fn aligned_sum(i: u32, blend: Blend) -> vec4<f32> {
-    if blend.bones < 2u {
-        return blend.heaviest;
-    }
-    var sum = vec4<f32>(0.0);
+// Joints on the side of the heaviest one, summed.
+fn summed(i: u32, blend: Blend) -> Sum {
+    var sum = Sum(vec4<f32>(0.0), vec4<f32>(0.0));
     for (var k = 0u; k < params.influence_sets; k += 1u) {
         let joint = indices[i * params.influence_sets + k];
-        let weight = signed_weights(joint, weights[i * params.influence_sets + k], blend.heaviest);
-        sum += weight.x * joints[joint.x].rotation + weight.y * joints[joint.y].rotation
-            + (weight.z * joints[joint.z].rotation + weight.w * joints[joint.w].rotation);
+        let weight = weights[i * params.influence_sets + k];
+        take_aligned(&sum, joints[joint.x].rotation, joints[joint.x].translation, weight.x, blend.heaviest);
+        take_aligned(&sum, joints[joint.y].rotation, joints[joint.y].translation, weight.y, blend.heaviest);
+        take_aligned(&sum, joints[joint.z].rotation, joints[joint.z].translation, weight.z, blend.heaviest);
+        take_aligned(&sum, joints[joint.w].rotation, joints[joint.w].translation, weight.w, blend.heaviest);
     }
-    return normalized_or(sum, blend.heaviest);
-}
-
-struct Motion {
-    rotation: vec4<f32>,
-    translation: vec3<f32>,
-}
-
-// 2 dual = t * rotation of a joint.
-fn doubled_dual(joint: Joint) -> vec4<f32> {
-    return multiply(vec4<f32>(joint.translation, 0.0), joint.rotation);
-}
-
-// Dual quaternions, on the side of the heaviest joint, summed and divided by the length of the real part.
-fn dual_quaternion(i: u32, blend: Blend) -> Motion {
-    var real = vec4<f32>(0.0);
-    var dual = vec4<f32>(0.0);
-    for (var k = 0u; k < params.influence_sets; k += 1u) {
-        let joint = indices[i * params.influence_sets + k];
-        let weight = signed_weights(joint, weights[i * params.influence_sets + k], blend.heaviest);
-        real += weight.x * joints[joint.x].rotation + weight.y * joints[joint.y].rotation
-            + (weight.z * joints[joint.z].rotation + weight.w * joints[joint.w].rotation);
-        dual += weight.x * doubled_dual(joints[joint.x]) + weight.y * doubled_dual(joints[joint.y])
-            + (weight.z * doubled_dual(joints[joint.z]) + weight.w * doubled_dual(joints[joint.w]));
-    }
-    if blend.bones == 0u {
-        return Motion(IDENTITY, vec3<f32>(0.0));
-    }
-    return Motion(normalized_or(real, blend.heaviest), multiply(dual, conjugate(real)).xyz / dot(real, real));
+    return sum;
 }
 
 fn write_motion(i: u32, mean: vec3<f32>, relative: vec4<f32>) {
@@ -694,7 +694,7 @@ fn aligned_sum_covariance(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < params.count {
         let i = params.first + id.x;
         let blend = gathered(i);
-        write_covariance(i, blended_mean(blend, gaussians[i].mean), aligned_sum(i, blend));
+        write_covariance(i, blended_mean(blend, gaussians[i].mean), aligned_sum(blend, summed(i, blend)));
     }
 }
 
@@ -703,7 +703,7 @@ fn aligned_sum_quaternion(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < params.count {
         let i = params.first + id.x;
         let blend = gathered(i);
-        write_quaternion(i, blended_mean(blend, gaussians[i].mean), aligned_sum(i, blend));
+        write_quaternion(i, blended_mean(blend, gaussians[i].mean), aligned_sum(blend, summed(i, blend)));
     }
 }
 
@@ -711,7 +711,8 @@ fn aligned_sum_quaternion(@builtin(global_invocation_id) id: vec3<u32>) {
 fn dual_quaternion_covariance(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < params.count {
         let i = params.first + id.x;
-        let motion = dual_quaternion(i, gathered(i));
+        let blend = gathered(i);
+        let motion = dual_quaternion(blend, summed(i, blend));
         write_covariance(i, rotate(motion.rotation, gaussians[i].mean) + motion.translation, motion.rotation);
     }
 }
@@ -720,7 +721,8 @@ fn dual_quaternion_covariance(@builtin(global_invocation_id) id: vec3<u32>) {
 fn dual_quaternion_quaternion(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < params.count {
         let i = params.first + id.x;
-        let motion = dual_quaternion(i, gathered(i));
+        let blend = gathered(i);
+        let motion = dual_quaternion(blend, summed(i, blend));
         write_quaternion(i, rotate(motion.rotation, gaussians[i].mean) + motion.translation, motion.rotation);
     }
 }

@@ -23,3 +23,19 @@ pub use choice::{Colour, Rotation, Shape, entry_points};
 
 /// The source, WGSL.
 pub const SKINNING: &str = include_str!("../shaders/skinning.wgsl");
+
+/// The same for WebGL 2, WGSL: a fragment per Gaussian. Comes after [`bindless`].
+pub const VIEW: &str = include_str!("../shaders/view.wgsl");
+
+/// [`VIEW`] in GLSL ES 3.00, with the functions that it needs.
+pub const VIEW_GLSL: &str = include_str!("../translations/view.frag");
+
+/// The functions of [`SKINNING`] that read no binding.
+pub fn bindless() -> &'static str {
+    SKINNING.split_once("// ---- Bindings").map_or(SKINNING, |(functions, _)| functions)
+}
+
+/// All of the shader for WebGL 2, WGSL.
+pub fn view_source() -> String {
+    [bindless(), VIEW].concat()
+}

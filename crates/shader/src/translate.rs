@@ -1,6 +1,6 @@
 //! The source in other languages, by naga.
 
-use super::{SKINNING, entry_points};
+use super::{SKINNING, VIEW, entry_points, view_source};
 use naga::back::{glsl, hlsl, msl, spv};
 use naga::proc::BoundsCheckPolicies;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
@@ -44,30 +44,56 @@ const BINDINGS: [(u32, u32); 13] =
 
 /// Every file: `skinning.hlsl` (shader model 5.1, a register space per group), `skinning.metal` (MSL 2.0, buffers 0 to 12 in the
 /// order of groups and bindings; 13, lengths of arrays, is never read), `skinning.spv` (SPIR-V 1.3, all entry points), `glsl/ENTRY_POINT.comp` (GLSL 4.30, bindings as in MSL).
-/// `SOURCE.sha256` is the source's digest. Indices are not
+/// `view.frag` (GLSL ES 3.00,
+/// the fragment shader of [`VIEW`]). `SOURCE.sha256` is the sources' digest. Indices are not
 /// checked: a joint that is not there is the caller's fault.
 ///
 /// # Errors
 /// The source is no valid WGSL, or a language lacks something.
 pub fn translations() -> Result<Vec<Translation>, TranslateError> {
-    let module = naga::front::wgsl::parse_str(SKINNING).map_err(|e| TranslateError::new("naga's IR", &e))?;
-    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
-    let info = validator.validate(&module).map_err(|e| TranslateError::new("valid WGSL", &e.into_inner()))?;
+    let (module, info) = parsed(SKINNING)?;
     let text = |path: &str, text: String| Translation { path: path.to_owned(), bytes: text.into_bytes() };
     let mut files = vec![
         text("skinning.hlsl", headed(&hlsl(&module, &info)?)),
         text("skinning.metal", headed(&msl(&module, &info)?)),
         Translation { path: "skinning.spv".to_owned(), bytes: spirv(&module, &info)? },
     ];
-    let digest: String = Sha256::digest(SKINNING).iter().map(|byte| format!("{byte:02x}")).collect();
-    files.push(text("SOURCE.sha256", format!("{digest}  skinning.wgsl\n")));
+    let digest: String =
+        Sha256::digest([SKINNING, VIEW].concat()).iter().map(|byte| format!("{byte:02x}")).collect();
+    files.push(text("SOURCE.sha256", format!("{digest}\n")));
     for entry_point in entry_points() {
         let source = glsl(&module, &info, &entry_point)?;
-        // The version has to be the first line.
-        let (version, rest) = source.split_once('\n').unwrap_or((&source, ""));
-        files.push(text(&format!("glsl/{entry_point}.comp"), format!("{version}\n{}", headed(rest))));
+        files.push(text(&format!("glsl/{entry_point}.comp"), after_version(&source)));
     }
+    files.push(view()?);
     Ok(files)
+}
+
+/// The skinning of the page that plays an avatar, as a fragment shader of WebGL 2.
+fn view() -> Result<Translation, TranslateError> {
+    let (module, info) = parsed(&view_source())?;
+    let options = glsl::Options {
+        version: glsl::Version::Embedded { version: 300, is_webgl: true },
+        writer_flags: glsl::WriterFlags::empty(),
+        binding_map: Default::default(),
+        zero_initialize_workgroup_memory: false,
+    };
+    let source = glsl_of(&module, &info, &options, ShaderStage::Fragment, "posed")?;
+    Ok(Translation { path: "view.frag".to_owned(), bytes: after_version(&source).into_bytes() })
+}
+
+/// The header of a GLSL file comes after the version, which has to be the first line.
+fn after_version(source: &str) -> String {
+    let (version, rest) = source.split_once('\n').unwrap_or((source, ""));
+    format!("{version}\n{}", headed(rest))
+}
+
+fn parsed(source: &str) -> Result<(Module, ModuleInfo), TranslateError> {
+    let module = naga::front::wgsl::parse_str(source)
+        .map_err(|e| TranslateError::new("naga's IR", &e.emit_to_string(source)))?;
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    let info = validator.validate(&module).map_err(|e| TranslateError::new("valid WGSL", &e.into_inner()))?;
+    Ok((module, info))
 }
 
 /// Says where a text comes from.
@@ -137,13 +163,20 @@ fn glsl(module: &Module, info: &ModuleInfo, entry_point: &str) -> Result<String,
         binding_map: BINDINGS.iter().enumerate().map(numbered).collect(),
         zero_initialize_workgroup_memory: false,
     };
-    let pipeline = glsl::PipelineOptions {
-        shader_stage: ShaderStage::Compute,
-        entry_point: entry_point.to_owned(),
-        multiview: None,
-    };
+    glsl_of(module, info, &options, ShaderStage::Compute, entry_point)
+}
+
+fn glsl_of(
+    module: &Module,
+    info: &ModuleInfo,
+    options: &glsl::Options,
+    shader_stage: ShaderStage,
+    entry_point: &str,
+) -> Result<String, TranslateError> {
+    let pipeline =
+        glsl::PipelineOptions { shader_stage, entry_point: entry_point.to_owned(), multiview: None };
     let mut text = String::new();
-    glsl::Writer::new(&mut text, module, info, &options, &pipeline, BoundsCheckPolicies::default())
+    glsl::Writer::new(&mut text, module, info, options, &pipeline, BoundsCheckPolicies::default())
         .and_then(|mut writer| writer.write().map(drop))
         .map_err(|e| TranslateError::new("GLSL", &e))?;
     Ok(text)

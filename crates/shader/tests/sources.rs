@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use sha2::{Digest, Sha256};
-use skinsplat_shader::{SKINNING, entry_points};
+use skinsplat_shader::{SKINNING, VIEW, entry_points};
 use std::path::Path;
 
 fn translation(path: &str) -> Vec<u8> {
@@ -12,7 +12,8 @@ fn translation(path: &str) -> Vec<u8> {
 
 #[test]
 fn translations_are_of_this_source() {
-    let digest: String = Sha256::digest(SKINNING).iter().map(|byte| format!("{byte:02x}")).collect();
+    let digest: String =
+        Sha256::digest([SKINNING, VIEW].concat()).iter().map(|byte| format!("{byte:02x}")).collect();
     let noted = String::from_utf8(translation("SOURCE.sha256")).unwrap();
     assert_eq!(
         noted.split_whitespace().next(),

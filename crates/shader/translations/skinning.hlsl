@@ -55,6 +55,17 @@ struct Blend {
     int _end_pad_1;
 };
 
+struct Sum {
+    float4 real;
+    float4 dual;
+};
+
+struct Motion {
+    float4 rotation;
+    float3 translation;
+    int _end_pad_0;
+};
+
 struct Covariance {
     float3 first;
     int _pad1_0;
@@ -72,12 +83,6 @@ struct ShRotation {
     Turn gamma;
     Turn beta;
     Turn alpha;
-};
-
-struct Motion {
-    float4 rotation;
-    float3 translation;
-    int _end_pad_0;
 };
 
 static const float EPSILON = 1.1920929e-7;
@@ -182,8 +187,8 @@ Blend ConstructBlend(Symmetric arg0, float3 arg1, float arg2, float4 arg3, float
 Blend empty_blend()
 {
     float3 zero = (0.0).xxx;
-    const Blend blend_9 = ConstructBlend(ConstructSymmetric((0.0).xxxx, zero, zero), zero, 0.0, IDENTITY, 0.0, IDENTITY, 0.0, IDENTITY, 0.0, 0u);
-    return blend_9;
+    const Blend blend_10 = ConstructBlend(ConstructSymmetric((0.0).xxxx, zero, zero), zero, 0.0, IDENTITY, 0.0, IDENTITY, 0.0, IDENTITY, 0.0, 0u);
+    return blend_10;
 }
 
 void take(inout Blend blend, float4 rotation, float3 translation, float weight)
@@ -455,6 +460,51 @@ float4 power_steps(Blend blend_4, uint steps)
     return _e26;
 }
 
+void take_aligned(inout Sum sum, float4 rotation_1, float3 translation_1, float weight_1, float4 reference_1)
+{
+    if (!((weight_1 > 0.0))) {
+        return;
+    }
+    const bool _e9 = is_opposite(rotation_1, reference_1);
+    float signed_ = (_e9 ? -(weight_1) : weight_1);
+    float4 _e12 = sum.real;
+    sum.real = (_e12 + (signed_ * rotation_1));
+    float4 _e16 = sum.dual;
+    const float4 _e19 = multiply(float4(translation_1, 0.0), rotation_1);
+    sum.dual = (_e16 + (signed_ * _e19));
+    return;
+}
+
+float4 aligned_sum(Blend blend_5, Sum sum_1)
+{
+    if ((blend_5.bones < 2u)) {
+        return blend_5.heaviest;
+    }
+    const float4 _e8 = normalized_or(sum_1.real, blend_5.heaviest);
+    return _e8;
+}
+
+Motion ConstructMotion(float4 arg0, float3 arg1) {
+    Motion ret = (Motion)0;
+    ret.rotation = arg0;
+    ret.translation = arg1;
+    return ret;
+}
+
+Motion dual_quaternion(Blend blend_6, Sum sum_2)
+{
+    if ((blend_6.bones == 0u)) {
+        const Motion motion = ConstructMotion(float4(0.0, 0.0, 0.0, 1.0), (0.0).xxx);
+        return motion;
+    }
+    const float4 _e15 = conjugate(sum_2.real);
+    const float4 _e16 = multiply(sum_2.dual, _e15);
+    float3 translation_2 = (_e16.xyz / (dot(sum_2.real, sum_2.real)).xxx);
+    const float4 _e25 = normalized_or(sum_2.real, blend_6.heaviest);
+    const Motion motion_1 = ConstructMotion(_e25, translation_2);
+    return motion_1;
+}
+
 Covariance ConstructCovariance(float3 arg0, float3 arg1) {
     Covariance ret = (Covariance)0;
     ret.first = arg0;
@@ -669,11 +719,11 @@ ret_sh_turned_3_ sh_turned_3_(float3 c_9[7], ShRotation r_2)
 
 Blend gathered(uint i)
 {
-    Blend blend_5 = (Blend)0;
+    Blend blend_7 = (Blend)0;
     uint k_2 = 0u;
 
     const Blend _e1 = empty_blend();
-    blend_5 = _e1;
+    blend_7 = _e1;
     bool loop_init_2 = true;
     while(true) {
         if (!loop_init_2) {
@@ -690,147 +740,72 @@ Blend gathered(uint i)
         {
             uint _e13 = params.influence_sets;
             uint _e15 = k_2;
-            uint4 joint_3 = asuint(indices_.Load4(((i * _e13) + _e15)*16));
+            uint4 joint = asuint(indices_.Load4(((i * _e13) + _e15)*16));
             uint _e22 = params.influence_sets;
             uint _e24 = k_2;
-            float4 weight_3 = asfloat(weights.Load4(((i * _e22) + _e24)*16));
-            float4 _e32 = asfloat(joints.Load4(0+joint_3.x*32));
-            float3 _e37 = asfloat(joints.Load3(16+joint_3.x*32));
-            take(blend_5, _e32, _e37, weight_3.x);
-            float4 _e43 = asfloat(joints.Load4(0+joint_3.y*32));
-            float3 _e48 = asfloat(joints.Load3(16+joint_3.y*32));
-            take(blend_5, _e43, _e48, weight_3.y);
-            float4 _e54 = asfloat(joints.Load4(0+joint_3.z*32));
-            float3 _e59 = asfloat(joints.Load3(16+joint_3.z*32));
-            take(blend_5, _e54, _e59, weight_3.z);
-            float4 _e65 = asfloat(joints.Load4(0+joint_3.w*32));
-            float3 _e70 = asfloat(joints.Load3(16+joint_3.w*32));
-            take(blend_5, _e65, _e70, weight_3.w);
+            float4 weight_2 = asfloat(weights.Load4(((i * _e22) + _e24)*16));
+            float4 _e32 = asfloat(joints.Load4(0+joint.x*32));
+            float3 _e37 = asfloat(joints.Load3(16+joint.x*32));
+            take(blend_7, _e32, _e37, weight_2.x);
+            float4 _e43 = asfloat(joints.Load4(0+joint.y*32));
+            float3 _e48 = asfloat(joints.Load3(16+joint.y*32));
+            take(blend_7, _e43, _e48, weight_2.y);
+            float4 _e54 = asfloat(joints.Load4(0+joint.z*32));
+            float3 _e59 = asfloat(joints.Load3(16+joint.z*32));
+            take(blend_7, _e54, _e59, weight_2.z);
+            float4 _e65 = asfloat(joints.Load4(0+joint.w*32));
+            float3 _e70 = asfloat(joints.Load3(16+joint.w*32));
+            take(blend_7, _e65, _e70, weight_2.w);
         }
     }
-    Blend _e75 = blend_5;
-    const Blend blend_10 = _e75;
-    return blend_10;
+    Blend _e75 = blend_7;
+    const Blend blend_11 = _e75;
+    return blend_11;
 }
 
 Blend gathered_two(uint i_1)
 {
-    Blend blend_6 = (Blend)0;
+    Blend blend_8 = (Blend)0;
 
     const Blend _e1 = empty_blend();
-    blend_6 = _e1;
+    blend_8 = _e1;
     uint _e6 = params.influence_sets;
     uint4 _e9 = asuint(indices_.Load4((i_1 * _e6)*16));
-    uint2 joint_4 = _e9.xy;
+    uint2 joint_1 = _e9.xy;
     uint _e14 = params.influence_sets;
     float4 _e17 = asfloat(weights.Load4((i_1 * _e14)*16));
-    float2 weight_4 = _e17.xy;
-    float4 _e23 = asfloat(joints.Load4(0+joint_4.x*32));
-    float3 _e28 = asfloat(joints.Load3(16+joint_4.x*32));
-    take(blend_6, _e23, _e28, weight_4.x);
-    float4 _e34 = asfloat(joints.Load4(0+joint_4.y*32));
-    float3 _e39 = asfloat(joints.Load3(16+joint_4.y*32));
-    take(blend_6, _e34, _e39, weight_4.y);
-    Blend _e41 = blend_6;
-    const Blend blend_11 = _e41;
-    return blend_11;
+    float2 weight_3 = _e17.xy;
+    float4 _e23 = asfloat(joints.Load4(0+joint_1.x*32));
+    float3 _e28 = asfloat(joints.Load3(16+joint_1.x*32));
+    take(blend_8, _e23, _e28, weight_3.x);
+    float4 _e34 = asfloat(joints.Load4(0+joint_1.y*32));
+    float3 _e39 = asfloat(joints.Load3(16+joint_1.y*32));
+    take(blend_8, _e34, _e39, weight_3.y);
+    Blend _e41 = blend_8;
+    const Blend blend_12 = _e41;
+    return blend_12;
 }
 
-float signed_weight(uint joint, float weight_1, float4 reference_1)
-{
-    if (!((weight_1 > 0.0))) {
-        return 0.0;
-    }
-    float4 _e11 = asfloat(joints.Load4(0+joint*32));
-    const bool _e12 = is_opposite(_e11, reference_1);
-    return (_e12 ? -(weight_1) : weight_1);
+Sum ConstructSum(float4 arg0, float4 arg1) {
+    Sum ret = (Sum)0;
+    ret.real = arg0;
+    ret.dual = arg1;
+    return ret;
 }
 
-float4 signed_weights(uint4 joint_1, float4 weight_2, float4 reference_2)
+Sum summed(uint i_2, Blend blend_9)
 {
-    const float _e5 = signed_weight(joint_1.x, weight_2.x, reference_2);
-    const float _e8 = signed_weight(joint_1.y, weight_2.y, reference_2);
-    const float _e11 = signed_weight(joint_1.z, weight_2.z, reference_2);
-    const float _e14 = signed_weight(joint_1.w, weight_2.w, reference_2);
-    return float4(_e5, _e8, _e11, _e14);
-}
-
-float4 aligned_sum(uint i_2, Blend blend_7)
-{
-    float4 sum = (0.0).xxxx;
+    Sum sum_3 = ConstructSum((0.0).xxxx, (0.0).xxxx);
     uint k_3 = 0u;
 
-    if ((blend_7.bones < 2u)) {
-        return blend_7.heaviest;
-    }
     bool loop_init_3 = true;
     while(true) {
         if (!loop_init_3) {
-            uint _e69 = k_3;
-            k_3 = (_e69 + 1u);
+            uint _e81 = k_3;
+            k_3 = (_e81 + 1u);
         }
         loop_init_3 = false;
-        uint _e11 = k_3;
-        uint _e14 = params.influence_sets;
-        if ((_e11 < _e14)) {
-        } else {
-            break;
-        }
-        {
-            uint _e19 = params.influence_sets;
-            uint _e21 = k_3;
-            uint4 joint_5 = asuint(indices_.Load4(((i_2 * _e19) + _e21)*16));
-            uint _e28 = params.influence_sets;
-            uint _e30 = k_3;
-            float4 _e33 = asfloat(weights.Load4(((i_2 * _e28) + _e30)*16));
-            const float4 _e35 = signed_weights(joint_5, _e33, blend_7.heaviest);
-            float4 _e36 = sum;
-            float4 _e42 = asfloat(joints.Load4(0+joint_5.x*32));
-            float4 _e49 = asfloat(joints.Load4(0+joint_5.y*32));
-            float4 _e57 = asfloat(joints.Load4(0+joint_5.z*32));
-            float4 _e64 = asfloat(joints.Load4(0+joint_5.w*32));
-            sum = (_e36 + (((_e35.x * _e42) + (_e35.y * _e49)) + ((_e35.z * _e57) + (_e35.w * _e64))));
-        }
-    }
-    float4 _e72 = sum;
-    const float4 _e74 = normalized_or(_e72, blend_7.heaviest);
-    return _e74;
-}
-
-float4 doubled_dual(Joint joint_2)
-{
-    const float4 _e5 = multiply(float4(joint_2.translation, 0.0), joint_2.rotation);
-    return _e5;
-}
-
-Motion ConstructMotion(float4 arg0, float3 arg1) {
-    Motion ret = (Motion)0;
-    ret.rotation = arg0;
-    ret.translation = arg1;
-    return ret;
-}
-
-Joint ConstructJoint(float4 arg0, float3 arg1) {
-    Joint ret = (Joint)0;
-    ret.rotation = arg0;
-    ret.translation = arg1;
-    return ret;
-}
-
-Motion dual_quaternion(uint i_3, Blend blend_8)
-{
-    float4 real = (0.0).xxxx;
-    float4 dual = (0.0).xxxx;
-    uint k_4 = 0u;
-
-    bool loop_init_4 = true;
-    while(true) {
-        if (!loop_init_4) {
-            uint _e101 = k_4;
-            k_4 = (_e101 + 1u);
-        }
-        loop_init_4 = false;
-        uint _e10 = k_4;
+        uint _e10 = k_3;
         uint _e13 = params.influence_sets;
         if ((_e10 < _e13)) {
         } else {
@@ -838,101 +813,85 @@ Motion dual_quaternion(uint i_3, Blend blend_8)
         }
         {
             uint _e18 = params.influence_sets;
-            uint _e20 = k_4;
-            uint4 joint_6 = asuint(indices_.Load4(((i_3 * _e18) + _e20)*16));
+            uint _e20 = k_3;
+            uint4 joint_2 = asuint(indices_.Load4(((i_2 * _e18) + _e20)*16));
             uint _e27 = params.influence_sets;
-            uint _e29 = k_4;
-            float4 _e32 = asfloat(weights.Load4(((i_3 * _e27) + _e29)*16));
-            const float4 _e34 = signed_weights(joint_6, _e32, blend_8.heaviest);
-            float4 _e35 = real;
-            float4 _e41 = asfloat(joints.Load4(0+joint_6.x*32));
-            float4 _e48 = asfloat(joints.Load4(0+joint_6.y*32));
-            float4 _e56 = asfloat(joints.Load4(0+joint_6.z*32));
-            float4 _e63 = asfloat(joints.Load4(0+joint_6.w*32));
-            real = (_e35 + (((_e34.x * _e41) + (_e34.y * _e48)) + ((_e34.z * _e56) + (_e34.w * _e63))));
-            float4 _e68 = dual;
-            Joint _e73 = ConstructJoint(asfloat(joints.Load4(joint_6.x*32+0)), asfloat(joints.Load3(joint_6.x*32+16)));
-            const float4 _e74 = doubled_dual(_e73);
-            Joint _e80 = ConstructJoint(asfloat(joints.Load4(joint_6.y*32+0)), asfloat(joints.Load3(joint_6.y*32+16)));
-            const float4 _e81 = doubled_dual(_e80);
-            Joint _e88 = ConstructJoint(asfloat(joints.Load4(joint_6.z*32+0)), asfloat(joints.Load3(joint_6.z*32+16)));
-            const float4 _e89 = doubled_dual(_e88);
-            Joint _e95 = ConstructJoint(asfloat(joints.Load4(joint_6.w*32+0)), asfloat(joints.Load3(joint_6.w*32+16)));
-            const float4 _e96 = doubled_dual(_e95);
-            dual = (_e68 + (((_e34.x * _e74) + (_e34.y * _e81)) + ((_e34.z * _e89) + (_e34.w * _e96))));
+            uint _e29 = k_3;
+            float4 weight_4 = asfloat(weights.Load4(((i_2 * _e27) + _e29)*16));
+            float4 _e37 = asfloat(joints.Load4(0+joint_2.x*32));
+            float3 _e42 = asfloat(joints.Load3(16+joint_2.x*32));
+            take_aligned(sum_3, _e37, _e42, weight_4.x, blend_9.heaviest);
+            float4 _e49 = asfloat(joints.Load4(0+joint_2.y*32));
+            float3 _e54 = asfloat(joints.Load3(16+joint_2.y*32));
+            take_aligned(sum_3, _e49, _e54, weight_4.y, blend_9.heaviest);
+            float4 _e61 = asfloat(joints.Load4(0+joint_2.z*32));
+            float3 _e66 = asfloat(joints.Load3(16+joint_2.z*32));
+            take_aligned(sum_3, _e61, _e66, weight_4.z, blend_9.heaviest);
+            float4 _e73 = asfloat(joints.Load4(0+joint_2.w*32));
+            float3 _e78 = asfloat(joints.Load3(16+joint_2.w*32));
+            take_aligned(sum_3, _e73, _e78, weight_4.w, blend_9.heaviest);
         }
     }
-    if ((blend_8.bones == 0u)) {
-        const Motion motion = ConstructMotion(float4(0.0, 0.0, 0.0, 1.0), (0.0).xxx);
-        return motion;
-    }
-    float4 _e115 = real;
-    const float4 _e117 = normalized_or(_e115, blend_8.heaviest);
-    float4 _e118 = dual;
-    float4 _e119 = real;
-    const float4 _e120 = conjugate(_e119);
-    const float4 _e121 = multiply(_e118, _e120);
-    float4 _e123 = real;
-    float4 _e124 = real;
-    const Motion motion_1 = ConstructMotion(_e117, (_e121.xyz / (dot(_e123, _e124)).xxx));
-    return motion_1;
+    Sum _e84 = sum_3;
+    const Sum sum_4 = _e84;
+    return sum_4;
 }
 
-void write_motion(uint i_4, float3 mean, float4 relative)
+void write_motion(uint i_3, float3 mean, float4 relative)
 {
-    means.Store4(i_4*16, asuint(float4(mean, 1.0)));
-    relatives.Store4(i_4*16, asuint(relative));
+    means.Store4(i_3*16, asuint(float4(mean, 1.0)));
+    relatives.Store4(i_3*16, asuint(relative));
     float3 _e11 = params.camera;
     float3 view = (mean - _e11);
     float distance_ = length(view);
     float3 unit = ((distance_ == 0.0) ? float3(0.0, 0.0, 1.0) : (view / (distance_).xxx));
     const float4 _e25 = conjugate(relative);
     const float3 _e26 = rotate(_e25, unit);
-    views.Store4(i_4*16, asuint(float4(_e26, 0.0)));
+    views.Store4(i_3*16, asuint(float4(_e26, 0.0)));
     return;
 }
 
-void write_covariance(uint i_5, float3 mean_1, float4 relative_1)
+void write_covariance(uint i_4, float3 mean_1, float4 relative_1)
 {
-    write_motion(i_5, mean_1, relative_1);
-    float4 _e6 = asfloat(gaussians.Load4(16+i_5*48));
+    write_motion(i_4, mean_1, relative_1);
+    float4 _e6 = asfloat(gaussians.Load4(16+i_4*48));
     const float4 _e7 = multiply(relative_1, _e6);
-    float3 _e11 = asfloat(gaussians.Load3(32+i_5*48));
+    float3 _e11 = asfloat(gaussians.Load3(32+i_4*48));
     const Covariance _e12 = covariance_of(_e7, _e11);
-    covariances.Store((6u * i_5)*4, asuint(_e12.first.x));
-    covariances.Store(((6u * i_5) + 1u)*4, asuint(_e12.first.y));
-    covariances.Store(((6u * i_5) + 2u)*4, asuint(_e12.first.z));
-    covariances.Store(((6u * i_5) + 3u)*4, asuint(_e12.second.x));
-    covariances.Store(((6u * i_5) + 4u)*4, asuint(_e12.second.y));
-    covariances.Store(((6u * i_5) + 5u)*4, asuint(_e12.second.z));
+    covariances.Store((6u * i_4)*4, asuint(_e12.first.x));
+    covariances.Store(((6u * i_4) + 1u)*4, asuint(_e12.first.y));
+    covariances.Store(((6u * i_4) + 2u)*4, asuint(_e12.first.z));
+    covariances.Store(((6u * i_4) + 3u)*4, asuint(_e12.second.x));
+    covariances.Store(((6u * i_4) + 4u)*4, asuint(_e12.second.y));
+    covariances.Store(((6u * i_4) + 5u)*4, asuint(_e12.second.z));
     return;
 }
 
-void write_quaternion(uint i_6, float3 mean_2, float4 relative_2)
+void write_quaternion(uint i_5, float3 mean_2, float4 relative_2)
 {
-    write_motion(i_6, mean_2, relative_2);
-    float4 _e8 = asfloat(gaussians.Load4(16+i_6*48));
+    write_motion(i_5, mean_2, relative_2);
+    float4 _e8 = asfloat(gaussians.Load4(16+i_5*48));
     const float4 _e9 = multiply(relative_2, _e8);
-    quaternions.Store4(i_6*16, asuint(_e9));
+    quaternions.Store4(i_5*16, asuint(_e9));
     return;
 }
 
-float3 coefficient(uint i_7, uint k_5)
+float3 coefficient(uint i_6, uint k_4)
 {
     uint _e4 = params.sh_stride;
     uint _e8 = params.sh_coefficient_stride;
-    uint at = ((i_7 * _e4) + (k_5 * _e8));
+    uint at = ((i_6 * _e4) + (k_4 * _e8));
     float _e13 = asfloat(sh.Load(at*4));
     float _e18 = asfloat(sh.Load((at + 1u)*4));
     float _e23 = asfloat(sh.Load((at + 2u)*4));
     return float3(_e13, _e18, _e23);
 }
 
-void write_coefficient(uint i_8, uint k_6, float3 c_10)
+void write_coefficient(uint i_7, uint k_5, float3 c_10)
 {
     uint _e5 = params.sh_stride;
     uint _e9 = params.sh_coefficient_stride;
-    uint at_1 = ((i_8 * _e5) + (k_6 * _e9));
+    uint at_1 = ((i_7 * _e5) + (k_5 * _e9));
     turned_sh.Store(at_1*4, asuint(c_10.x));
     turned_sh.Store((at_1 + 1u)*4, asuint(c_10.y));
     turned_sh.Store((at_1 + 2u)*4, asuint(c_10.z));
@@ -940,35 +899,35 @@ void write_coefficient(uint i_8, uint k_6, float3 c_10)
 }
 
 typedef float3 ret_band_1_[3];
-ret_band_1_ band_1_(uint i_9)
+ret_band_1_ band_1_(uint i_8)
 {
-    const float3 _e2 = coefficient(i_9, 1u);
-    const float3 _e4 = coefficient(i_9, 2u);
-    const float3 _e6 = coefficient(i_9, 3u);
+    const float3 _e2 = coefficient(i_8, 1u);
+    const float3 _e4 = coefficient(i_8, 2u);
+    const float3 _e6 = coefficient(i_8, 3u);
     return Constructarray3_float3_(_e2, _e4, _e6);
 }
 
 typedef float3 ret_band_2_[5];
-ret_band_2_ band_2_(uint i_10)
+ret_band_2_ band_2_(uint i_9)
 {
-    const float3 _e2 = coefficient(i_10, 4u);
-    const float3 _e4 = coefficient(i_10, 5u);
-    const float3 _e6 = coefficient(i_10, 6u);
-    const float3 _e8 = coefficient(i_10, 7u);
-    const float3 _e10 = coefficient(i_10, 8u);
+    const float3 _e2 = coefficient(i_9, 4u);
+    const float3 _e4 = coefficient(i_9, 5u);
+    const float3 _e6 = coefficient(i_9, 6u);
+    const float3 _e8 = coefficient(i_9, 7u);
+    const float3 _e10 = coefficient(i_9, 8u);
     return Constructarray5_float3_(_e2, _e4, _e6, _e8, _e10);
 }
 
 typedef float3 ret_band_3_[7];
-ret_band_3_ band_3_(uint i_11)
+ret_band_3_ band_3_(uint i_10)
 {
-    const float3 _e2 = coefficient(i_11, 9u);
-    const float3 _e4 = coefficient(i_11, 10u);
-    const float3 _e6 = coefficient(i_11, 11u);
-    const float3 _e8 = coefficient(i_11, 12u);
-    const float3 _e10 = coefficient(i_11, 13u);
-    const float3 _e12 = coefficient(i_11, 14u);
-    const float3 _e14 = coefficient(i_11, 15u);
+    const float3 _e2 = coefficient(i_10, 9u);
+    const float3 _e4 = coefficient(i_10, 10u);
+    const float3 _e6 = coefficient(i_10, 11u);
+    const float3 _e8 = coefficient(i_10, 12u);
+    const float3 _e10 = coefficient(i_10, 13u);
+    const float3 _e12 = coefficient(i_10, 14u);
+    const float3 _e14 = coefficient(i_10, 15u);
     return Constructarray7_float3_(_e2, _e4, _e6, _e8, _e10, _e12, _e14);
 }
 
@@ -978,12 +937,12 @@ void two_bones_covariance(uint3 id : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id.x < _e4)) {
         uint _e8 = params.first;
-        uint i_12 = (_e8 + id.x);
-        const Blend _e11 = gathered_two(i_12);
-        float3 _e15 = asfloat(gaussians.Load3(0+i_12*48));
+        uint i_11 = (_e8 + id.x);
+        const Blend _e11 = gathered_two(i_11);
+        float3 _e15 = asfloat(gaussians.Load3(0+i_11*48));
         const float3 _e16 = blended_mean(_e11, _e15);
         const float4 _e17 = closed_form_of_two(_e11);
-        write_covariance(i_12, _e16, _e17);
+        write_covariance(i_11, _e16, _e17);
         return;
     } else {
         return;
@@ -996,12 +955,12 @@ void two_bones_quaternion(uint3 id_1 : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id_1.x < _e4)) {
         uint _e8 = params.first;
-        uint i_13 = (_e8 + id_1.x);
-        const Blend _e11 = gathered_two(i_13);
-        float3 _e15 = asfloat(gaussians.Load3(0+i_13*48));
+        uint i_12 = (_e8 + id_1.x);
+        const Blend _e11 = gathered_two(i_12);
+        float3 _e15 = asfloat(gaussians.Load3(0+i_12*48));
         const float3 _e16 = blended_mean(_e11, _e15);
         const float4 _e17 = closed_form_of_two(_e11);
-        write_quaternion(i_13, _e16, _e17);
+        write_quaternion(i_12, _e16, _e17);
         return;
     } else {
         return;
@@ -1014,12 +973,12 @@ void closed_form_covariance(uint3 id_2 : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id_2.x < _e4)) {
         uint _e8 = params.first;
-        uint i_14 = (_e8 + id_2.x);
-        const Blend _e11 = gathered(i_14);
-        float3 _e15 = asfloat(gaussians.Load3(0+i_14*48));
+        uint i_13 = (_e8 + id_2.x);
+        const Blend _e11 = gathered(i_13);
+        float3 _e15 = asfloat(gaussians.Load3(0+i_13*48));
         const float3 _e16 = blended_mean(_e11, _e15);
         const float4 _e17 = closed_form(_e11);
-        write_covariance(i_14, _e16, _e17);
+        write_covariance(i_13, _e16, _e17);
         return;
     } else {
         return;
@@ -1032,12 +991,12 @@ void closed_form_quaternion(uint3 id_3 : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id_3.x < _e4)) {
         uint _e8 = params.first;
-        uint i_15 = (_e8 + id_3.x);
-        const Blend _e11 = gathered(i_15);
-        float3 _e15 = asfloat(gaussians.Load3(0+i_15*48));
+        uint i_14 = (_e8 + id_3.x);
+        const Blend _e11 = gathered(i_14);
+        float3 _e15 = asfloat(gaussians.Load3(0+i_14*48));
         const float3 _e16 = blended_mean(_e11, _e15);
         const float4 _e17 = closed_form(_e11);
-        write_quaternion(i_15, _e16, _e17);
+        write_quaternion(i_14, _e16, _e17);
         return;
     } else {
         return;
@@ -1050,13 +1009,13 @@ void power_covariance(uint3 id_4 : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id_4.x < _e4)) {
         uint _e8 = params.first;
-        uint i_16 = (_e8 + id_4.x);
-        const Blend _e11 = gathered(i_16);
-        float3 _e15 = asfloat(gaussians.Load3(0+i_16*48));
+        uint i_15 = (_e8 + id_4.x);
+        const Blend _e11 = gathered(i_15);
+        float3 _e15 = asfloat(gaussians.Load3(0+i_15*48));
         const float3 _e16 = blended_mean(_e11, _e15);
         uint _e19 = params.power_steps;
         const float4 _e20 = power_steps(_e11, _e19);
-        write_covariance(i_16, _e16, _e20);
+        write_covariance(i_15, _e16, _e20);
         return;
     } else {
         return;
@@ -1069,13 +1028,13 @@ void power_quaternion(uint3 id_5 : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id_5.x < _e4)) {
         uint _e8 = params.first;
-        uint i_17 = (_e8 + id_5.x);
-        const Blend _e11 = gathered(i_17);
-        float3 _e15 = asfloat(gaussians.Load3(0+i_17*48));
+        uint i_16 = (_e8 + id_5.x);
+        const Blend _e11 = gathered(i_16);
+        float3 _e15 = asfloat(gaussians.Load3(0+i_16*48));
         const float3 _e16 = blended_mean(_e11, _e15);
         uint _e19 = params.power_steps;
         const float4 _e20 = power_steps(_e11, _e19);
-        write_quaternion(i_17, _e16, _e20);
+        write_quaternion(i_16, _e16, _e20);
         return;
     } else {
         return;
@@ -1088,12 +1047,13 @@ void aligned_sum_covariance(uint3 id_6 : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id_6.x < _e4)) {
         uint _e8 = params.first;
-        uint i_18 = (_e8 + id_6.x);
-        const Blend _e11 = gathered(i_18);
-        float3 _e15 = asfloat(gaussians.Load3(0+i_18*48));
+        uint i_17 = (_e8 + id_6.x);
+        const Blend _e11 = gathered(i_17);
+        float3 _e15 = asfloat(gaussians.Load3(0+i_17*48));
         const float3 _e16 = blended_mean(_e11, _e15);
-        const float4 _e17 = aligned_sum(i_18, _e11);
-        write_covariance(i_18, _e16, _e17);
+        const Sum _e17 = summed(i_17, _e11);
+        const float4 _e18 = aligned_sum(_e11, _e17);
+        write_covariance(i_17, _e16, _e18);
         return;
     } else {
         return;
@@ -1106,12 +1066,13 @@ void aligned_sum_quaternion(uint3 id_7 : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id_7.x < _e4)) {
         uint _e8 = params.first;
-        uint i_19 = (_e8 + id_7.x);
-        const Blend _e11 = gathered(i_19);
-        float3 _e15 = asfloat(gaussians.Load3(0+i_19*48));
+        uint i_18 = (_e8 + id_7.x);
+        const Blend _e11 = gathered(i_18);
+        float3 _e15 = asfloat(gaussians.Load3(0+i_18*48));
         const float3 _e16 = blended_mean(_e11, _e15);
-        const float4 _e17 = aligned_sum(i_19, _e11);
-        write_quaternion(i_19, _e16, _e17);
+        const Sum _e17 = summed(i_18, _e11);
+        const float4 _e18 = aligned_sum(_e11, _e17);
+        write_quaternion(i_18, _e16, _e18);
         return;
     } else {
         return;
@@ -1124,12 +1085,13 @@ void dual_quaternion_covariance(uint3 id_8 : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id_8.x < _e4)) {
         uint _e8 = params.first;
-        uint i_20 = (_e8 + id_8.x);
-        const Blend _e11 = gathered(i_20);
-        const Motion _e12 = dual_quaternion(i_20, _e11);
-        float3 _e17 = asfloat(gaussians.Load3(0+i_20*48));
-        const float3 _e18 = rotate(_e12.rotation, _e17);
-        write_covariance(i_20, (_e18 + _e12.translation), _e12.rotation);
+        uint i_19 = (_e8 + id_8.x);
+        const Blend _e11 = gathered(i_19);
+        const Sum _e12 = summed(i_19, _e11);
+        const Motion _e13 = dual_quaternion(_e11, _e12);
+        float3 _e18 = asfloat(gaussians.Load3(0+i_19*48));
+        const float3 _e19 = rotate(_e13.rotation, _e18);
+        write_covariance(i_19, (_e19 + _e13.translation), _e13.rotation);
         return;
     } else {
         return;
@@ -1142,12 +1104,13 @@ void dual_quaternion_quaternion(uint3 id_9 : SV_DispatchThreadID)
     uint _e4 = params.count;
     if ((id_9.x < _e4)) {
         uint _e8 = params.first;
-        uint i_21 = (_e8 + id_9.x);
-        const Blend _e11 = gathered(i_21);
-        const Motion _e12 = dual_quaternion(i_21, _e11);
-        float3 _e17 = asfloat(gaussians.Load3(0+i_21*48));
-        const float3 _e18 = rotate(_e12.rotation, _e17);
-        write_quaternion(i_21, (_e18 + _e12.translation), _e12.rotation);
+        uint i_20 = (_e8 + id_9.x);
+        const Blend _e11 = gathered(i_20);
+        const Sum _e12 = summed(i_20, _e11);
+        const Motion _e13 = dual_quaternion(_e11, _e12);
+        float3 _e18 = asfloat(gaussians.Load3(0+i_20*48));
+        const float3 _e19 = rotate(_e13.rotation, _e18);
+        write_quaternion(i_20, (_e19 + _e13.translation), _e13.rotation);
         return;
     } else {
         return;
@@ -1164,34 +1127,34 @@ void colour(uint3 id_10 : SV_DispatchThreadID)
         return;
     }
     uint _e8 = params.first;
-    uint i_22 = (_e8 + id_10.x);
-    float4 _e13 = asfloat(views.Load4(i_22*16));
+    uint i_21 = (_e8 + id_10.x);
+    float4 _e13 = asfloat(views.Load4(i_21*16));
     float3 d_5 = _e13.xyz;
-    const float3 _e19 = coefficient(i_22, 0u);
+    const float3 _e19 = coefficient(i_21, 0u);
     rgb = ((0.5).xxx + (C0_ * _e19));
     uint _e25 = params.sh_degree;
     if ((_e25 >= 1u)) {
-        const float3 _e28[3] = band_1_(i_22);
+        const float3 _e28[3] = band_1_(i_21);
         float3 _e29 = rgb;
         const float3 _e33 = sh_degree_1_(d_5, _e28[0], _e28[1], _e28[2]);
         rgb = (_e29 + _e33);
     }
     uint _e37 = params.sh_degree;
     if ((_e37 >= 2u)) {
-        const float3 _e40[5] = band_2_(i_22);
+        const float3 _e40[5] = band_2_(i_21);
         const float _e41[5] = basis_2_(d_5);
         float3 _e42 = rgb;
         rgb = (_e42 + (((((_e41[0] * _e40[0]) + (_e41[1] * _e40[1])) + (_e41[2] * _e40[2])) + (_e41[3] * _e40[3])) + (_e41[4] * _e40[4])));
     }
     uint _e65 = params.sh_degree;
     if ((_e65 >= 3u)) {
-        const float3 _e68[7] = band_3_(i_22);
+        const float3 _e68[7] = band_3_(i_21);
         const float _e69[7] = basis_3_(d_5);
         float3 _e70 = rgb;
         rgb = (_e70 + (((((((_e69[0] * _e68[0]) + (_e69[1] * _e68[1])) + (_e69[2] * _e68[2])) + (_e69[3] * _e68[3])) + (_e69[4] * _e68[4])) + (_e69[5] * _e68[5])) + (_e69[6] * _e68[6])));
     }
     float3 _e101 = rgb;
-    colours.Store4(i_22*16, asuint(float4(max(_e101, (0.0).xxx), 1.0)));
+    colours.Store4(i_21*16, asuint(float4(max(_e101, (0.0).xxx), 1.0)));
     return;
 }
 
@@ -1203,40 +1166,40 @@ void turn_sh(uint3 id_11 : SV_DispatchThreadID)
         return;
     }
     uint _e8 = params.first;
-    uint i_23 = (_e8 + id_11.x);
-    float4 _e13 = asfloat(relatives.Load4(i_23*16));
+    uint i_22 = (_e8 + id_11.x);
+    float4 _e13 = asfloat(relatives.Load4(i_22*16));
     const ShRotation _e14 = sh_rotation(_e13);
-    const float3 _e17 = coefficient(i_23, 0u);
-    write_coefficient(i_23, 0u, _e17);
+    const float3 _e17 = coefficient(i_22, 0u);
+    write_coefficient(i_22, 0u, _e17);
     uint _e20 = params.sh_degree;
     if ((_e20 >= 1u)) {
-        const float3 _e23[3] = band_1_(i_23);
+        const float3 _e23[3] = band_1_(i_22);
         const float3 _e24[3] = sh_turned_1_(_e23, _e14);
-        write_coefficient(i_23, 1u, _e24[0]);
-        write_coefficient(i_23, 2u, _e24[1]);
-        write_coefficient(i_23, 3u, _e24[2]);
+        write_coefficient(i_22, 1u, _e24[0]);
+        write_coefficient(i_22, 2u, _e24[1]);
+        write_coefficient(i_22, 3u, _e24[2]);
     }
     uint _e33 = params.sh_degree;
     if ((_e33 >= 2u)) {
-        const float3 _e36[5] = band_2_(i_23);
+        const float3 _e36[5] = band_2_(i_22);
         const float3 _e37[5] = sh_turned_2_(_e36, _e14);
-        write_coefficient(i_23, 4u, _e37[0]);
-        write_coefficient(i_23, 5u, _e37[1]);
-        write_coefficient(i_23, 6u, _e37[2]);
-        write_coefficient(i_23, 7u, _e37[3]);
-        write_coefficient(i_23, 8u, _e37[4]);
+        write_coefficient(i_22, 4u, _e37[0]);
+        write_coefficient(i_22, 5u, _e37[1]);
+        write_coefficient(i_22, 6u, _e37[2]);
+        write_coefficient(i_22, 7u, _e37[3]);
+        write_coefficient(i_22, 8u, _e37[4]);
     }
     uint _e50 = params.sh_degree;
     if ((_e50 >= 3u)) {
-        const float3 _e53[7] = band_3_(i_23);
+        const float3 _e53[7] = band_3_(i_22);
         const float3 _e54[7] = sh_turned_3_(_e53, _e14);
-        write_coefficient(i_23, 9u, _e54[0]);
-        write_coefficient(i_23, 10u, _e54[1]);
-        write_coefficient(i_23, 11u, _e54[2]);
-        write_coefficient(i_23, 12u, _e54[3]);
-        write_coefficient(i_23, 13u, _e54[4]);
-        write_coefficient(i_23, 14u, _e54[5]);
-        write_coefficient(i_23, 15u, _e54[6]);
+        write_coefficient(i_22, 9u, _e54[0]);
+        write_coefficient(i_22, 10u, _e54[1]);
+        write_coefficient(i_22, 11u, _e54[2]);
+        write_coefficient(i_22, 12u, _e54[3]);
+        write_coefficient(i_22, 13u, _e54[4]);
+        write_coefficient(i_22, 14u, _e54[5]);
+        write_coefficient(i_22, 15u, _e54[6]);
         return;
     } else {
         return;

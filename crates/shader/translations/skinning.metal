@@ -61,14 +61,22 @@ struct Blend {
     uint bones;
     char _pad10[8];
 };
+struct Sum {
+    metal::float4 real;
+    metal::float4 dual;
+};
+struct Motion {
+    metal::float4 rotation;
+    metal::float3 translation;
+};
 struct Covariance {
     metal::float3 first;
     metal::float3 second;
 };
-struct type_7 {
+struct type_8 {
     float inner[5];
 };
-struct type_8 {
+struct type_9 {
     float inner[7];
 };
 struct Turn {
@@ -81,24 +89,20 @@ struct ShRotation {
     Turn beta;
     Turn alpha;
 };
-struct type_9 {
+struct type_10 {
     metal::float3 inner[3];
 };
-struct type_10 {
+struct type_11 {
     metal::float3 inner[5];
 };
-struct type_11 {
+struct type_12 {
     metal::float3 inner[7];
 };
-typedef Joint type_12[1];
-typedef Gaussian type_13[1];
-typedef metal::uint4 type_15[1];
-typedef metal::float4 type_16[1];
-typedef float type_17[1];
-struct Motion {
-    metal::float4 rotation;
-    metal::float3 translation;
-};
+typedef Joint type_13[1];
+typedef Gaussian type_14[1];
+typedef metal::uint4 type_16[1];
+typedef metal::float4 type_17[1];
+typedef float type_18[1];
 constant float EPSILON = 0.00000011920929;
 constant metal::float4 IDENTITY = metal::float4(0.0, 0.0, 0.0, 1.0);
 constant float RANK_ONE = 0.0002;
@@ -467,6 +471,51 @@ metal::float4 power_steps(
     return _e26;
 }
 
+void take_aligned(
+    thread Sum& sum,
+    metal::float4 rotation_1,
+    metal::float3 translation_1,
+    float weight_1,
+    metal::float4 reference_1
+) {
+    if (!((weight_1 > 0.0))) {
+        return;
+    }
+    bool _e9 = is_opposite(rotation_1, reference_1);
+    float signed_ = _e9 ? -(weight_1) : weight_1;
+    metal::float4 _e12 = sum.real;
+    sum.real = _e12 + (signed_ * rotation_1);
+    metal::float4 _e16 = sum.dual;
+    metal::float4 _e19 = multiply(metal::float4(translation_1, 0.0), rotation_1);
+    sum.dual = _e16 + (signed_ * _e19);
+    return;
+}
+
+metal::float4 aligned_sum(
+    Blend blend_5,
+    Sum sum_1
+) {
+    if (blend_5.bones < 2u) {
+        return blend_5.heaviest;
+    }
+    metal::float4 _e8 = normalized_or(sum_1.real, blend_5.heaviest);
+    return _e8;
+}
+
+Motion dual_quaternion(
+    Blend blend_6,
+    Sum sum_2
+) {
+    if (blend_6.bones == 0u) {
+        return Motion {metal::float4(0.0, 0.0, 0.0, 1.0), metal::float3(0.0)};
+    }
+    metal::float4 _e15 = conjugate(sum_2.real);
+    metal::float4 _e16 = multiply(sum_2.dual, _e15);
+    metal::float3 translation_2 = _e16.xyz / metal::float3(metal::dot(sum_2.real, sum_2.real));
+    metal::float4 _e25 = normalized_or(sum_2.real, blend_6.heaviest);
+    return Motion {_e25, translation_2};
+}
+
 Covariance covariance_of(
     metal::float4 q_5,
     metal::float3 s
@@ -487,19 +536,19 @@ metal::float3 sh_degree_1_(
     return C1_ * (((d.z * b_1) - (d.y * a_7)) - (d.x * c));
 }
 
-type_7 basis_2_(
+type_8 basis_2_(
     metal::float3 d_1
 ) {
-    return type_7 {{(1.0925485 * d_1.x) * d_1.y, (-1.0925485 * d_1.y) * d_1.z, 0.31539157 * ((((2.0 * d_1.z) * d_1.z) - (d_1.x * d_1.x)) - (d_1.y * d_1.y)), (-1.0925485 * d_1.x) * d_1.z, 0.54627424 * ((d_1.x * d_1.x) - (d_1.y * d_1.y))}};
+    return type_8 {{(1.0925485 * d_1.x) * d_1.y, (-1.0925485 * d_1.y) * d_1.z, 0.31539157 * ((((2.0 * d_1.z) * d_1.z) - (d_1.x * d_1.x)) - (d_1.y * d_1.y)), (-1.0925485 * d_1.x) * d_1.z, 0.54627424 * ((d_1.x * d_1.x) - (d_1.y * d_1.y))}};
 }
 
-type_8 basis_3_(
+type_9 basis_3_(
     metal::float3 d_2
 ) {
     float xx = d_2.x * d_2.x;
     float yy = d_2.y * d_2.y;
     float zz = d_2.z * d_2.z;
-    return type_8 {{(-0.5900436 * d_2.y) * ((3.0 * xx) - yy), ((2.8906114 * d_2.x) * d_2.y) * d_2.z, (-0.4570458 * d_2.y) * (((4.0 * zz) - xx) - yy), (0.37317634 * d_2.z) * (((2.0 * zz) - (3.0 * xx)) - (3.0 * yy)), (-0.4570458 * d_2.x) * (((4.0 * zz) - xx) - yy), (1.4453057 * d_2.z) * (xx - yy), (-0.5900436 * d_2.x) * (xx - (3.0 * yy))}};
+    return type_9 {{(-0.5900436 * d_2.y) * ((3.0 * xx) - yy), ((2.8906114 * d_2.x) * d_2.y) * d_2.z, (-0.4570458 * d_2.y) * (((4.0 * zz) - xx) - yy), (0.37317634 * d_2.z) * (((2.0 * zz) - (3.0 * xx)) - (3.0 * yy)), (-0.4570458 * d_2.x) * (((4.0 * zz) - xx) - yy), (1.4453057 * d_2.z) * (xx - yy), (-0.5900436 * d_2.x) * (xx - (3.0 * yy))}};
 }
 
 metal::float2 compose(
@@ -559,28 +608,28 @@ metal::float3 minus_turned(
     return (plus_1 * turn_1.y) + (minus_1 * turn_1.x);
 }
 
-type_9 about_z_1_(
-    type_9 c_1,
+type_10 about_z_1_(
+    type_10 c_1,
     Turn t
 ) {
     metal::float3 _e5 = minus_turned(c_1.inner[0], c_1.inner[2], t.one);
     metal::float3 _e10 = plus_turned(c_1.inner[0], c_1.inner[2], t.one);
-    return type_9 {{_e5, c_1.inner[1], _e10}};
+    return type_10 {{_e5, c_1.inner[1], _e10}};
 }
 
-type_10 about_z_2_(
-    type_10 c_2,
+type_11 about_z_2_(
+    type_11 c_2,
     Turn t_1
 ) {
     metal::float3 _e5 = minus_turned(c_2.inner[0], c_2.inner[4], t_1.two);
     metal::float3 _e9 = minus_turned(c_2.inner[1], c_2.inner[3], t_1.one);
     metal::float3 _e14 = plus_turned(c_2.inner[1], c_2.inner[3], t_1.one);
     metal::float3 _e18 = plus_turned(c_2.inner[0], c_2.inner[4], t_1.two);
-    return type_10 {{_e5, _e9, c_2.inner[2], _e14, _e18}};
+    return type_11 {{_e5, _e9, c_2.inner[2], _e14, _e18}};
 }
 
-type_11 about_z_3_(
-    type_11 c_3,
+type_12 about_z_3_(
+    type_12 c_3,
     Turn t_2
 ) {
     metal::float3 _e5 = minus_turned(c_3.inner[0], c_3.inner[6], t_2.three);
@@ -589,75 +638,75 @@ type_11 about_z_3_(
     metal::float3 _e18 = plus_turned(c_3.inner[2], c_3.inner[4], t_2.one);
     metal::float3 _e22 = plus_turned(c_3.inner[1], c_3.inner[5], t_2.two);
     metal::float3 _e26 = plus_turned(c_3.inner[0], c_3.inner[6], t_2.three);
-    return type_11 {{_e5, _e9, _e13, c_3.inner[3], _e18, _e22, _e26}};
+    return type_12 {{_e5, _e9, _e13, c_3.inner[3], _e18, _e22, _e26}};
 }
 
-type_9 exchanged_1_(
-    type_9 c_4
+type_10 exchanged_1_(
+    type_10 c_4
 ) {
-    return type_9 {{-(c_4.inner[1]), -(c_4.inner[0]), c_4.inner[2]}};
+    return type_10 {{-(c_4.inner[1]), -(c_4.inner[0]), c_4.inner[2]}};
 }
 
-type_10 exchanged_2_(
-    type_10 c_5
+type_11 exchanged_2_(
+    type_11 c_5
 ) {
-    return type_10 {{-(c_5.inner[3]), c_5.inner[1], -(((c_5.inner[2] * 0.5) + (c_5.inner[4] * 0.8660254))), -(c_5.inner[0]), (c_5.inner[4] * 0.5) - (c_5.inner[2] * 0.8660254)}};
+    return type_11 {{-(c_5.inner[3]), c_5.inner[1], -(((c_5.inner[2] * 0.5) + (c_5.inner[4] * 0.8660254))), -(c_5.inner[0]), (c_5.inner[4] * 0.5) - (c_5.inner[2] * 0.8660254)}};
 }
 
-type_11 exchanged_3_(
-    type_11 c_6
+type_12 exchanged_3_(
+    type_12 c_6
 ) {
-    return type_11 {{(c_6.inner[3] * 0.7905694) - (c_6.inner[5] * 0.61237246), c_6.inner[1], (c_6.inner[3] * 0.61237246) + (c_6.inner[5] * 0.7905694), (c_6.inner[0] * 0.7905694) + (c_6.inner[2] * 0.61237246), -(((c_6.inner[4] * 0.25) + (c_6.inner[6] * 0.96824586))), (c_6.inner[2] * 0.7905694) - (c_6.inner[0] * 0.61237246), (c_6.inner[6] * 0.25) - (c_6.inner[4] * 0.96824586)}};
+    return type_12 {{(c_6.inner[3] * 0.7905694) - (c_6.inner[5] * 0.61237246), c_6.inner[1], (c_6.inner[3] * 0.61237246) + (c_6.inner[5] * 0.7905694), (c_6.inner[0] * 0.7905694) + (c_6.inner[2] * 0.61237246), -(((c_6.inner[4] * 0.25) + (c_6.inner[6] * 0.96824586))), (c_6.inner[2] * 0.7905694) - (c_6.inner[0] * 0.61237246), (c_6.inner[6] * 0.25) - (c_6.inner[4] * 0.96824586)}};
 }
 
-type_9 sh_turned_1_(
-    type_9 c_7,
+type_10 sh_turned_1_(
+    type_10 c_7,
     ShRotation r
 ) {
-    type_9 _e3 = about_z_1_(c_7, r.gamma);
-    type_9 _e4 = exchanged_1_(_e3);
-    type_9 _e6 = about_z_1_(_e4, r.beta);
-    type_9 _e7 = exchanged_1_(_e6);
-    type_9 _e9 = about_z_1_(_e7, r.alpha);
+    type_10 _e3 = about_z_1_(c_7, r.gamma);
+    type_10 _e4 = exchanged_1_(_e3);
+    type_10 _e6 = about_z_1_(_e4, r.beta);
+    type_10 _e7 = exchanged_1_(_e6);
+    type_10 _e9 = about_z_1_(_e7, r.alpha);
     return _e9;
 }
 
-type_10 sh_turned_2_(
-    type_10 c_8,
+type_11 sh_turned_2_(
+    type_11 c_8,
     ShRotation r_1
 ) {
-    type_10 _e3 = about_z_2_(c_8, r_1.gamma);
-    type_10 _e4 = exchanged_2_(_e3);
-    type_10 _e6 = about_z_2_(_e4, r_1.beta);
-    type_10 _e7 = exchanged_2_(_e6);
-    type_10 _e9 = about_z_2_(_e7, r_1.alpha);
+    type_11 _e3 = about_z_2_(c_8, r_1.gamma);
+    type_11 _e4 = exchanged_2_(_e3);
+    type_11 _e6 = about_z_2_(_e4, r_1.beta);
+    type_11 _e7 = exchanged_2_(_e6);
+    type_11 _e9 = about_z_2_(_e7, r_1.alpha);
     return _e9;
 }
 
-type_11 sh_turned_3_(
-    type_11 c_9,
+type_12 sh_turned_3_(
+    type_12 c_9,
     ShRotation r_2
 ) {
-    type_11 _e3 = about_z_3_(c_9, r_2.gamma);
-    type_11 _e4 = exchanged_3_(_e3);
-    type_11 _e6 = about_z_3_(_e4, r_2.beta);
-    type_11 _e7 = exchanged_3_(_e6);
-    type_11 _e9 = about_z_3_(_e7, r_2.alpha);
+    type_12 _e3 = about_z_3_(c_9, r_2.gamma);
+    type_12 _e4 = exchanged_3_(_e3);
+    type_12 _e6 = about_z_3_(_e4, r_2.beta);
+    type_12 _e7 = exchanged_3_(_e6);
+    type_12 _e9 = about_z_3_(_e7, r_2.alpha);
     return _e9;
 }
 
 Blend gathered(
     uint i,
     constant Params& params,
-    device type_12 const& joints,
-    device type_15 const& indices,
-    device type_16 const& weights,
+    device type_13 const& joints,
+    device type_16 const& indices,
+    device type_17 const& weights,
     constant _mslBufferSizes& _buffer_sizes
 ) {
-    Blend blend_5 = {};
+    Blend blend_7 = {};
     uint k_2 = 0u;
     Blend _e1 = empty_blend();
-    blend_5 = _e1;
+    blend_7 = _e1;
     bool loop_init_2 = true;
     while(true) {
         if (!loop_init_2) {
@@ -674,159 +723,74 @@ Blend gathered(
         {
             uint _e13 = params.influence_sets;
             uint _e15 = k_2;
-            metal::uint4 joint_3 = indices[(i * _e13) + _e15];
+            metal::uint4 joint = indices[(i * _e13) + _e15];
             uint _e22 = params.influence_sets;
             uint _e24 = k_2;
-            metal::float4 weight_3 = weights[(i * _e22) + _e24];
-            metal::float4 _e32 = joints[joint_3.x].rotation;
-            metal::float3 _e37 = joints[joint_3.x].translation;
-            take(blend_5, _e32, _e37, weight_3.x);
-            metal::float4 _e43 = joints[joint_3.y].rotation;
-            metal::float3 _e48 = joints[joint_3.y].translation;
-            take(blend_5, _e43, _e48, weight_3.y);
-            metal::float4 _e54 = joints[joint_3.z].rotation;
-            metal::float3 _e59 = joints[joint_3.z].translation;
-            take(blend_5, _e54, _e59, weight_3.z);
-            metal::float4 _e65 = joints[joint_3.w].rotation;
-            metal::float3 _e70 = joints[joint_3.w].translation;
-            take(blend_5, _e65, _e70, weight_3.w);
+            metal::float4 weight_2 = weights[(i * _e22) + _e24];
+            metal::float4 _e32 = joints[joint.x].rotation;
+            metal::float3 _e37 = joints[joint.x].translation;
+            take(blend_7, _e32, _e37, weight_2.x);
+            metal::float4 _e43 = joints[joint.y].rotation;
+            metal::float3 _e48 = joints[joint.y].translation;
+            take(blend_7, _e43, _e48, weight_2.y);
+            metal::float4 _e54 = joints[joint.z].rotation;
+            metal::float3 _e59 = joints[joint.z].translation;
+            take(blend_7, _e54, _e59, weight_2.z);
+            metal::float4 _e65 = joints[joint.w].rotation;
+            metal::float3 _e70 = joints[joint.w].translation;
+            take(blend_7, _e65, _e70, weight_2.w);
         }
     }
-    Blend _e75 = blend_5;
+    Blend _e75 = blend_7;
     return _e75;
 }
 
 Blend gathered_two(
     uint i_1,
     constant Params& params,
-    device type_12 const& joints,
-    device type_15 const& indices,
-    device type_16 const& weights,
+    device type_13 const& joints,
+    device type_16 const& indices,
+    device type_17 const& weights,
     constant _mslBufferSizes& _buffer_sizes
 ) {
-    Blend blend_6 = {};
+    Blend blend_8 = {};
     Blend _e1 = empty_blend();
-    blend_6 = _e1;
+    blend_8 = _e1;
     uint _e6 = params.influence_sets;
     metal::uint4 _e9 = indices[i_1 * _e6];
-    metal::uint2 joint_4 = _e9.xy;
+    metal::uint2 joint_1 = _e9.xy;
     uint _e14 = params.influence_sets;
     metal::float4 _e17 = weights[i_1 * _e14];
-    metal::float2 weight_4 = _e17.xy;
-    metal::float4 _e23 = joints[joint_4.x].rotation;
-    metal::float3 _e28 = joints[joint_4.x].translation;
-    take(blend_6, _e23, _e28, weight_4.x);
-    metal::float4 _e34 = joints[joint_4.y].rotation;
-    metal::float3 _e39 = joints[joint_4.y].translation;
-    take(blend_6, _e34, _e39, weight_4.y);
-    Blend _e41 = blend_6;
+    metal::float2 weight_3 = _e17.xy;
+    metal::float4 _e23 = joints[joint_1.x].rotation;
+    metal::float3 _e28 = joints[joint_1.x].translation;
+    take(blend_8, _e23, _e28, weight_3.x);
+    metal::float4 _e34 = joints[joint_1.y].rotation;
+    metal::float3 _e39 = joints[joint_1.y].translation;
+    take(blend_8, _e34, _e39, weight_3.y);
+    Blend _e41 = blend_8;
     return _e41;
 }
 
-float signed_weight(
-    uint joint,
-    float weight_1,
-    metal::float4 reference_1,
-    device type_12 const& joints,
-    constant _mslBufferSizes& _buffer_sizes
-) {
-    if (!((weight_1 > 0.0))) {
-        return 0.0;
-    }
-    metal::float4 _e11 = joints[joint].rotation;
-    bool _e12 = is_opposite(_e11, reference_1);
-    return _e12 ? -(weight_1) : weight_1;
-}
-
-metal::float4 signed_weights(
-    metal::uint4 joint_1,
-    metal::float4 weight_2,
-    metal::float4 reference_2,
-    device type_12 const& joints,
-    constant _mslBufferSizes& _buffer_sizes
-) {
-    float _e5 = signed_weight(joint_1.x, weight_2.x, reference_2, joints, _buffer_sizes);
-    float _e8 = signed_weight(joint_1.y, weight_2.y, reference_2, joints, _buffer_sizes);
-    float _e11 = signed_weight(joint_1.z, weight_2.z, reference_2, joints, _buffer_sizes);
-    float _e14 = signed_weight(joint_1.w, weight_2.w, reference_2, joints, _buffer_sizes);
-    return metal::float4(_e5, _e8, _e11, _e14);
-}
-
-metal::float4 aligned_sum(
+Sum summed(
     uint i_2,
-    Blend blend_7,
+    Blend blend_9,
     constant Params& params,
-    device type_12 const& joints,
-    device type_15 const& indices,
-    device type_16 const& weights,
+    device type_13 const& joints,
+    device type_16 const& indices,
+    device type_17 const& weights,
     constant _mslBufferSizes& _buffer_sizes
 ) {
-    metal::float4 sum = metal::float4(0.0);
+    Sum sum_3 = Sum {metal::float4(0.0), metal::float4(0.0)};
     uint k_3 = 0u;
-    if (blend_7.bones < 2u) {
-        return blend_7.heaviest;
-    }
     bool loop_init_3 = true;
     while(true) {
         if (!loop_init_3) {
-            uint _e69 = k_3;
-            k_3 = _e69 + 1u;
+            uint _e81 = k_3;
+            k_3 = _e81 + 1u;
         }
         loop_init_3 = false;
-        uint _e11 = k_3;
-        uint _e14 = params.influence_sets;
-        if (_e11 < _e14) {
-        } else {
-            break;
-        }
-        {
-            uint _e19 = params.influence_sets;
-            uint _e21 = k_3;
-            metal::uint4 joint_5 = indices[(i_2 * _e19) + _e21];
-            uint _e28 = params.influence_sets;
-            uint _e30 = k_3;
-            metal::float4 _e33 = weights[(i_2 * _e28) + _e30];
-            metal::float4 _e35 = signed_weights(joint_5, _e33, blend_7.heaviest, joints, _buffer_sizes);
-            metal::float4 _e36 = sum;
-            metal::float4 _e42 = joints[joint_5.x].rotation;
-            metal::float4 _e49 = joints[joint_5.y].rotation;
-            metal::float4 _e57 = joints[joint_5.z].rotation;
-            metal::float4 _e64 = joints[joint_5.w].rotation;
-            sum = _e36 + (((_e35.x * _e42) + (_e35.y * _e49)) + ((_e35.z * _e57) + (_e35.w * _e64)));
-        }
-    }
-    metal::float4 _e72 = sum;
-    metal::float4 _e74 = normalized_or(_e72, blend_7.heaviest);
-    return _e74;
-}
-
-metal::float4 doubled_dual(
-    Joint joint_2
-) {
-    metal::float4 _e5 = multiply(metal::float4(joint_2.translation, 0.0), joint_2.rotation);
-    return _e5;
-}
-
-Motion dual_quaternion(
-    uint i_3,
-    Blend blend_8,
-    constant Params& params,
-    device type_12 const& joints,
-    device type_15 const& indices,
-    device type_16 const& weights,
-    constant _mslBufferSizes& _buffer_sizes
-) {
-    metal::float4 real = metal::float4(0.0);
-    metal::float4 dual = metal::float4(0.0);
-    uint k_4 = 0u;
-    bool loop_init_4 = true;
-    while(true) {
-        if (!loop_init_4) {
-            uint _e101 = k_4;
-            k_4 = _e101 + 1u;
-        }
-        loop_init_4 = false;
-        uint _e10 = k_4;
+        uint _e10 = k_3;
         uint _e13 = params.influence_sets;
         if (_e10 < _e13) {
         } else {
@@ -834,121 +798,106 @@ Motion dual_quaternion(
         }
         {
             uint _e18 = params.influence_sets;
-            uint _e20 = k_4;
-            metal::uint4 joint_6 = indices[(i_3 * _e18) + _e20];
+            uint _e20 = k_3;
+            metal::uint4 joint_2 = indices[(i_2 * _e18) + _e20];
             uint _e27 = params.influence_sets;
-            uint _e29 = k_4;
-            metal::float4 _e32 = weights[(i_3 * _e27) + _e29];
-            metal::float4 _e34 = signed_weights(joint_6, _e32, blend_8.heaviest, joints, _buffer_sizes);
-            metal::float4 _e35 = real;
-            metal::float4 _e41 = joints[joint_6.x].rotation;
-            metal::float4 _e48 = joints[joint_6.y].rotation;
-            metal::float4 _e56 = joints[joint_6.z].rotation;
-            metal::float4 _e63 = joints[joint_6.w].rotation;
-            real = _e35 + (((_e34.x * _e41) + (_e34.y * _e48)) + ((_e34.z * _e56) + (_e34.w * _e63)));
-            metal::float4 _e68 = dual;
-            Joint _e73 = joints[joint_6.x];
-            metal::float4 _e74 = doubled_dual(_e73);
-            Joint _e80 = joints[joint_6.y];
-            metal::float4 _e81 = doubled_dual(_e80);
-            Joint _e88 = joints[joint_6.z];
-            metal::float4 _e89 = doubled_dual(_e88);
-            Joint _e95 = joints[joint_6.w];
-            metal::float4 _e96 = doubled_dual(_e95);
-            dual = _e68 + (((_e34.x * _e74) + (_e34.y * _e81)) + ((_e34.z * _e89) + (_e34.w * _e96)));
+            uint _e29 = k_3;
+            metal::float4 weight_4 = weights[(i_2 * _e27) + _e29];
+            metal::float4 _e37 = joints[joint_2.x].rotation;
+            metal::float3 _e42 = joints[joint_2.x].translation;
+            take_aligned(sum_3, _e37, _e42, weight_4.x, blend_9.heaviest);
+            metal::float4 _e49 = joints[joint_2.y].rotation;
+            metal::float3 _e54 = joints[joint_2.y].translation;
+            take_aligned(sum_3, _e49, _e54, weight_4.y, blend_9.heaviest);
+            metal::float4 _e61 = joints[joint_2.z].rotation;
+            metal::float3 _e66 = joints[joint_2.z].translation;
+            take_aligned(sum_3, _e61, _e66, weight_4.z, blend_9.heaviest);
+            metal::float4 _e73 = joints[joint_2.w].rotation;
+            metal::float3 _e78 = joints[joint_2.w].translation;
+            take_aligned(sum_3, _e73, _e78, weight_4.w, blend_9.heaviest);
         }
     }
-    if (blend_8.bones == 0u) {
-        return Motion {metal::float4(0.0, 0.0, 0.0, 1.0), metal::float3(0.0)};
-    }
-    metal::float4 _e115 = real;
-    metal::float4 _e117 = normalized_or(_e115, blend_8.heaviest);
-    metal::float4 _e118 = dual;
-    metal::float4 _e119 = real;
-    metal::float4 _e120 = conjugate(_e119);
-    metal::float4 _e121 = multiply(_e118, _e120);
-    metal::float4 _e123 = real;
-    metal::float4 _e124 = real;
-    return Motion {_e117, _e121.xyz / metal::float3(metal::dot(_e123, _e124))};
+    Sum _e84 = sum_3;
+    return _e84;
 }
 
 void write_motion(
-    uint i_4,
+    uint i_3,
     metal::float3 mean,
     metal::float4 relative,
     constant Params& params,
-    device type_16& means,
-    device type_16& relatives,
-    device type_16& views,
+    device type_17& means,
+    device type_17& relatives,
+    device type_17& views,
     constant _mslBufferSizes& _buffer_sizes
 ) {
-    means[i_4] = metal::float4(mean, 1.0);
-    relatives[i_4] = relative;
+    means[i_3] = metal::float4(mean, 1.0);
+    relatives[i_3] = relative;
     metal::float3 _e11 = params.camera;
     metal::float3 view = mean - _e11;
     float distance = metal::length(view);
     metal::float3 unit = (distance == 0.0) ? metal::float3(0.0, 0.0, 1.0) : (view / metal::float3(distance));
     metal::float4 _e25 = conjugate(relative);
     metal::float3 _e26 = rotate(_e25, unit);
-    views[i_4] = metal::float4(_e26, 0.0);
+    views[i_3] = metal::float4(_e26, 0.0);
     return;
 }
 
 void write_covariance(
-    uint i_5,
+    uint i_4,
     metal::float3 mean_1,
     metal::float4 relative_1,
     constant Params& params,
-    device type_13 const& gaussians,
-    device type_16& means,
-    device type_17& covariances,
-    device type_16& relatives,
-    device type_16& views,
+    device type_14 const& gaussians,
+    device type_17& means,
+    device type_18& covariances,
+    device type_17& relatives,
+    device type_17& views,
     constant _mslBufferSizes& _buffer_sizes
 ) {
-    write_motion(i_5, mean_1, relative_1, params, means, relatives, views, _buffer_sizes);
-    metal::float4 _e6 = gaussians[i_5].rotation;
+    write_motion(i_4, mean_1, relative_1, params, means, relatives, views, _buffer_sizes);
+    metal::float4 _e6 = gaussians[i_4].rotation;
     metal::float4 _e7 = multiply(relative_1, _e6);
-    metal::float3 _e11 = gaussians[i_5].scale;
+    metal::float3 _e11 = gaussians[i_4].scale;
     Covariance _e12 = covariance_of(_e7, _e11);
-    covariances[6u * i_5] = _e12.first.x;
-    covariances[(6u * i_5) + 1u] = _e12.first.y;
-    covariances[(6u * i_5) + 2u] = _e12.first.z;
-    covariances[(6u * i_5) + 3u] = _e12.second.x;
-    covariances[(6u * i_5) + 4u] = _e12.second.y;
-    covariances[(6u * i_5) + 5u] = _e12.second.z;
+    covariances[6u * i_4] = _e12.first.x;
+    covariances[(6u * i_4) + 1u] = _e12.first.y;
+    covariances[(6u * i_4) + 2u] = _e12.first.z;
+    covariances[(6u * i_4) + 3u] = _e12.second.x;
+    covariances[(6u * i_4) + 4u] = _e12.second.y;
+    covariances[(6u * i_4) + 5u] = _e12.second.z;
     return;
 }
 
 void write_quaternion(
-    uint i_6,
+    uint i_5,
     metal::float3 mean_2,
     metal::float4 relative_2,
     constant Params& params,
-    device type_13 const& gaussians,
-    device type_16& means,
-    device type_16& quaternions,
-    device type_16& relatives,
-    device type_16& views,
+    device type_14 const& gaussians,
+    device type_17& means,
+    device type_17& quaternions,
+    device type_17& relatives,
+    device type_17& views,
     constant _mslBufferSizes& _buffer_sizes
 ) {
-    write_motion(i_6, mean_2, relative_2, params, means, relatives, views, _buffer_sizes);
-    metal::float4 _e8 = gaussians[i_6].rotation;
+    write_motion(i_5, mean_2, relative_2, params, means, relatives, views, _buffer_sizes);
+    metal::float4 _e8 = gaussians[i_5].rotation;
     metal::float4 _e9 = multiply(relative_2, _e8);
-    quaternions[i_6] = _e9;
+    quaternions[i_5] = _e9;
     return;
 }
 
 metal::float3 coefficient(
-    uint i_7,
-    uint k_5,
+    uint i_6,
+    uint k_4,
     constant Params& params,
-    device type_17 const& sh,
+    device type_18 const& sh,
     constant _mslBufferSizes& _buffer_sizes
 ) {
     uint _e4 = params.sh_stride;
     uint _e8 = params.sh_coefficient_stride;
-    uint at = (i_7 * _e4) + (k_5 * _e8);
+    uint at = (i_6 * _e4) + (k_4 * _e8);
     float _e13 = sh[at];
     float _e18 = sh[at + 1u];
     float _e23 = sh[at + 2u];
@@ -956,62 +905,62 @@ metal::float3 coefficient(
 }
 
 void write_coefficient(
-    uint i_8,
-    uint k_6,
+    uint i_7,
+    uint k_5,
     metal::float3 c_10,
     constant Params& params,
-    device type_17& turned_sh,
+    device type_18& turned_sh,
     constant _mslBufferSizes& _buffer_sizes
 ) {
     uint _e5 = params.sh_stride;
     uint _e9 = params.sh_coefficient_stride;
-    uint at_1 = (i_8 * _e5) + (k_6 * _e9);
+    uint at_1 = (i_7 * _e5) + (k_5 * _e9);
     turned_sh[at_1] = c_10.x;
     turned_sh[at_1 + 1u] = c_10.y;
     turned_sh[at_1 + 2u] = c_10.z;
     return;
 }
 
-type_9 band_1_(
+type_10 band_1_(
+    uint i_8,
+    constant Params& params,
+    device type_18 const& sh,
+    constant _mslBufferSizes& _buffer_sizes
+) {
+    metal::float3 _e2 = coefficient(i_8, 1u, params, sh, _buffer_sizes);
+    metal::float3 _e4 = coefficient(i_8, 2u, params, sh, _buffer_sizes);
+    metal::float3 _e6 = coefficient(i_8, 3u, params, sh, _buffer_sizes);
+    return type_10 {{_e2, _e4, _e6}};
+}
+
+type_11 band_2_(
     uint i_9,
     constant Params& params,
-    device type_17 const& sh,
+    device type_18 const& sh,
     constant _mslBufferSizes& _buffer_sizes
 ) {
-    metal::float3 _e2 = coefficient(i_9, 1u, params, sh, _buffer_sizes);
-    metal::float3 _e4 = coefficient(i_9, 2u, params, sh, _buffer_sizes);
-    metal::float3 _e6 = coefficient(i_9, 3u, params, sh, _buffer_sizes);
-    return type_9 {{_e2, _e4, _e6}};
+    metal::float3 _e2 = coefficient(i_9, 4u, params, sh, _buffer_sizes);
+    metal::float3 _e4 = coefficient(i_9, 5u, params, sh, _buffer_sizes);
+    metal::float3 _e6 = coefficient(i_9, 6u, params, sh, _buffer_sizes);
+    metal::float3 _e8 = coefficient(i_9, 7u, params, sh, _buffer_sizes);
+    metal::float3 _e10 = coefficient(i_9, 8u, params, sh, _buffer_sizes);
+    return type_11 {{_e2, _e4, _e6, _e8, _e10}};
 }
 
-type_10 band_2_(
+type_12 band_3_(
     uint i_10,
     constant Params& params,
-    device type_17 const& sh,
+    device type_18 const& sh,
     constant _mslBufferSizes& _buffer_sizes
 ) {
-    metal::float3 _e2 = coefficient(i_10, 4u, params, sh, _buffer_sizes);
-    metal::float3 _e4 = coefficient(i_10, 5u, params, sh, _buffer_sizes);
-    metal::float3 _e6 = coefficient(i_10, 6u, params, sh, _buffer_sizes);
-    metal::float3 _e8 = coefficient(i_10, 7u, params, sh, _buffer_sizes);
-    metal::float3 _e10 = coefficient(i_10, 8u, params, sh, _buffer_sizes);
-    return type_10 {{_e2, _e4, _e6, _e8, _e10}};
-}
-
-type_11 band_3_(
-    uint i_11,
-    constant Params& params,
-    device type_17 const& sh,
-    constant _mslBufferSizes& _buffer_sizes
-) {
-    metal::float3 _e2 = coefficient(i_11, 9u, params, sh, _buffer_sizes);
-    metal::float3 _e4 = coefficient(i_11, 10u, params, sh, _buffer_sizes);
-    metal::float3 _e6 = coefficient(i_11, 11u, params, sh, _buffer_sizes);
-    metal::float3 _e8 = coefficient(i_11, 12u, params, sh, _buffer_sizes);
-    metal::float3 _e10 = coefficient(i_11, 13u, params, sh, _buffer_sizes);
-    metal::float3 _e12 = coefficient(i_11, 14u, params, sh, _buffer_sizes);
-    metal::float3 _e14 = coefficient(i_11, 15u, params, sh, _buffer_sizes);
-    return type_11 {{_e2, _e4, _e6, _e8, _e10, _e12, _e14}};
+    metal::float3 _e2 = coefficient(i_10, 9u, params, sh, _buffer_sizes);
+    metal::float3 _e4 = coefficient(i_10, 10u, params, sh, _buffer_sizes);
+    metal::float3 _e6 = coefficient(i_10, 11u, params, sh, _buffer_sizes);
+    metal::float3 _e8 = coefficient(i_10, 12u, params, sh, _buffer_sizes);
+    metal::float3 _e10 = coefficient(i_10, 13u, params, sh, _buffer_sizes);
+    metal::float3 _e12 = coefficient(i_10, 14u, params, sh, _buffer_sizes);
+    metal::float3 _e14 = coefficient(i_10, 15u, params, sh, _buffer_sizes);
+    return type_12 {{_e2, _e4, _e6, _e8, _e10, _e12, _e14}};
 }
 
 struct two_bones_covarianceInput {
@@ -1019,25 +968,25 @@ struct two_bones_covarianceInput {
 kernel void two_bones_covariance(
   metal::uint3 id [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_17& covariances [[buffer(6)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_18& covariances [[buffer(6)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id.x < _e4) {
         uint _e8 = params.first;
-        uint i_12 = _e8 + id.x;
-        Blend _e11 = gathered_two(i_12, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e15 = gaussians[i_12].mean;
+        uint i_11 = _e8 + id.x;
+        Blend _e11 = gathered_two(i_11, params, joints, indices, weights, _buffer_sizes);
+        metal::float3 _e15 = gaussians[i_11].mean;
         metal::float3 _e16 = blended_mean(_e11, _e15);
         metal::float4 _e17 = closed_form_of_two(_e11);
-        write_covariance(i_12, _e16, _e17, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
+        write_covariance(i_11, _e16, _e17, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1050,25 +999,25 @@ struct two_bones_quaternionInput {
 kernel void two_bones_quaternion(
   metal::uint3 id_1 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_16& quaternions [[buffer(7)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_17& quaternions [[buffer(7)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id_1.x < _e4) {
         uint _e8 = params.first;
-        uint i_13 = _e8 + id_1.x;
-        Blend _e11 = gathered_two(i_13, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e15 = gaussians[i_13].mean;
+        uint i_12 = _e8 + id_1.x;
+        Blend _e11 = gathered_two(i_12, params, joints, indices, weights, _buffer_sizes);
+        metal::float3 _e15 = gaussians[i_12].mean;
         metal::float3 _e16 = blended_mean(_e11, _e15);
         metal::float4 _e17 = closed_form_of_two(_e11);
-        write_quaternion(i_13, _e16, _e17, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
+        write_quaternion(i_12, _e16, _e17, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1081,25 +1030,25 @@ struct closed_form_covarianceInput {
 kernel void closed_form_covariance(
   metal::uint3 id_2 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_17& covariances [[buffer(6)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_18& covariances [[buffer(6)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id_2.x < _e4) {
         uint _e8 = params.first;
-        uint i_14 = _e8 + id_2.x;
-        Blend _e11 = gathered(i_14, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e15 = gaussians[i_14].mean;
+        uint i_13 = _e8 + id_2.x;
+        Blend _e11 = gathered(i_13, params, joints, indices, weights, _buffer_sizes);
+        metal::float3 _e15 = gaussians[i_13].mean;
         metal::float3 _e16 = blended_mean(_e11, _e15);
         metal::float4 _e17 = closed_form(_e11);
-        write_covariance(i_14, _e16, _e17, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
+        write_covariance(i_13, _e16, _e17, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1112,25 +1061,25 @@ struct closed_form_quaternionInput {
 kernel void closed_form_quaternion(
   metal::uint3 id_3 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_16& quaternions [[buffer(7)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_17& quaternions [[buffer(7)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id_3.x < _e4) {
         uint _e8 = params.first;
-        uint i_15 = _e8 + id_3.x;
-        Blend _e11 = gathered(i_15, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e15 = gaussians[i_15].mean;
+        uint i_14 = _e8 + id_3.x;
+        Blend _e11 = gathered(i_14, params, joints, indices, weights, _buffer_sizes);
+        metal::float3 _e15 = gaussians[i_14].mean;
         metal::float3 _e16 = blended_mean(_e11, _e15);
         metal::float4 _e17 = closed_form(_e11);
-        write_quaternion(i_15, _e16, _e17, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
+        write_quaternion(i_14, _e16, _e17, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1143,26 +1092,26 @@ struct power_covarianceInput {
 kernel void power_covariance(
   metal::uint3 id_4 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_17& covariances [[buffer(6)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_18& covariances [[buffer(6)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id_4.x < _e4) {
         uint _e8 = params.first;
-        uint i_16 = _e8 + id_4.x;
-        Blend _e11 = gathered(i_16, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e15 = gaussians[i_16].mean;
+        uint i_15 = _e8 + id_4.x;
+        Blend _e11 = gathered(i_15, params, joints, indices, weights, _buffer_sizes);
+        metal::float3 _e15 = gaussians[i_15].mean;
         metal::float3 _e16 = blended_mean(_e11, _e15);
         uint _e19 = params.power_steps;
         metal::float4 _e20 = power_steps(_e11, _e19);
-        write_covariance(i_16, _e16, _e20, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
+        write_covariance(i_15, _e16, _e20, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1175,26 +1124,26 @@ struct power_quaternionInput {
 kernel void power_quaternion(
   metal::uint3 id_5 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_16& quaternions [[buffer(7)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_17& quaternions [[buffer(7)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id_5.x < _e4) {
         uint _e8 = params.first;
-        uint i_17 = _e8 + id_5.x;
-        Blend _e11 = gathered(i_17, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e15 = gaussians[i_17].mean;
+        uint i_16 = _e8 + id_5.x;
+        Blend _e11 = gathered(i_16, params, joints, indices, weights, _buffer_sizes);
+        metal::float3 _e15 = gaussians[i_16].mean;
         metal::float3 _e16 = blended_mean(_e11, _e15);
         uint _e19 = params.power_steps;
         metal::float4 _e20 = power_steps(_e11, _e19);
-        write_quaternion(i_17, _e16, _e20, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
+        write_quaternion(i_16, _e16, _e20, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1207,25 +1156,26 @@ struct aligned_sum_covarianceInput {
 kernel void aligned_sum_covariance(
   metal::uint3 id_6 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_17& covariances [[buffer(6)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_18& covariances [[buffer(6)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id_6.x < _e4) {
         uint _e8 = params.first;
-        uint i_18 = _e8 + id_6.x;
-        Blend _e11 = gathered(i_18, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e15 = gaussians[i_18].mean;
+        uint i_17 = _e8 + id_6.x;
+        Blend _e11 = gathered(i_17, params, joints, indices, weights, _buffer_sizes);
+        metal::float3 _e15 = gaussians[i_17].mean;
         metal::float3 _e16 = blended_mean(_e11, _e15);
-        metal::float4 _e17 = aligned_sum(i_18, _e11, params, joints, indices, weights, _buffer_sizes);
-        write_covariance(i_18, _e16, _e17, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
+        Sum _e17 = summed(i_17, _e11, params, joints, indices, weights, _buffer_sizes);
+        metal::float4 _e18 = aligned_sum(_e11, _e17);
+        write_covariance(i_17, _e16, _e18, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1238,25 +1188,26 @@ struct aligned_sum_quaternionInput {
 kernel void aligned_sum_quaternion(
   metal::uint3 id_7 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_16& quaternions [[buffer(7)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_17& quaternions [[buffer(7)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id_7.x < _e4) {
         uint _e8 = params.first;
-        uint i_19 = _e8 + id_7.x;
-        Blend _e11 = gathered(i_19, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e15 = gaussians[i_19].mean;
+        uint i_18 = _e8 + id_7.x;
+        Blend _e11 = gathered(i_18, params, joints, indices, weights, _buffer_sizes);
+        metal::float3 _e15 = gaussians[i_18].mean;
         metal::float3 _e16 = blended_mean(_e11, _e15);
-        metal::float4 _e17 = aligned_sum(i_19, _e11, params, joints, indices, weights, _buffer_sizes);
-        write_quaternion(i_19, _e16, _e17, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
+        Sum _e17 = summed(i_18, _e11, params, joints, indices, weights, _buffer_sizes);
+        metal::float4 _e18 = aligned_sum(_e11, _e17);
+        write_quaternion(i_18, _e16, _e18, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1269,25 +1220,26 @@ struct dual_quaternion_covarianceInput {
 kernel void dual_quaternion_covariance(
   metal::uint3 id_8 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_17& covariances [[buffer(6)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_18& covariances [[buffer(6)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id_8.x < _e4) {
         uint _e8 = params.first;
-        uint i_20 = _e8 + id_8.x;
-        Blend _e11 = gathered(i_20, params, joints, indices, weights, _buffer_sizes);
-        Motion _e12 = dual_quaternion(i_20, _e11, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e17 = gaussians[i_20].mean;
-        metal::float3 _e18 = rotate(_e12.rotation, _e17);
-        write_covariance(i_20, _e18 + _e12.translation, _e12.rotation, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
+        uint i_19 = _e8 + id_8.x;
+        Blend _e11 = gathered(i_19, params, joints, indices, weights, _buffer_sizes);
+        Sum _e12 = summed(i_19, _e11, params, joints, indices, weights, _buffer_sizes);
+        Motion _e13 = dual_quaternion(_e11, _e12);
+        metal::float3 _e18 = gaussians[i_19].mean;
+        metal::float3 _e19 = rotate(_e13.rotation, _e18);
+        write_covariance(i_19, _e19 + _e13.translation, _e13.rotation, params, gaussians, means, covariances, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1300,25 +1252,26 @@ struct dual_quaternion_quaternionInput {
 kernel void dual_quaternion_quaternion(
   metal::uint3 id_9 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_12 const& joints [[buffer(1)]]
-, device type_13 const& gaussians [[buffer(2)]]
-, device type_15 const& indices [[buffer(3)]]
-, device type_16 const& weights [[buffer(4)]]
-, device type_16& means [[buffer(5)]]
-, device type_16& quaternions [[buffer(7)]]
-, device type_16& relatives [[buffer(8)]]
-, device type_16& views [[buffer(9)]]
+, device type_13 const& joints [[buffer(1)]]
+, device type_14 const& gaussians [[buffer(2)]]
+, device type_16 const& indices [[buffer(3)]]
+, device type_17 const& weights [[buffer(4)]]
+, device type_17& means [[buffer(5)]]
+, device type_17& quaternions [[buffer(7)]]
+, device type_17& relatives [[buffer(8)]]
+, device type_17& views [[buffer(9)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
     if (id_9.x < _e4) {
         uint _e8 = params.first;
-        uint i_21 = _e8 + id_9.x;
-        Blend _e11 = gathered(i_21, params, joints, indices, weights, _buffer_sizes);
-        Motion _e12 = dual_quaternion(i_21, _e11, params, joints, indices, weights, _buffer_sizes);
-        metal::float3 _e17 = gaussians[i_21].mean;
-        metal::float3 _e18 = rotate(_e12.rotation, _e17);
-        write_quaternion(i_21, _e18 + _e12.translation, _e12.rotation, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
+        uint i_20 = _e8 + id_9.x;
+        Blend _e11 = gathered(i_20, params, joints, indices, weights, _buffer_sizes);
+        Sum _e12 = summed(i_20, _e11, params, joints, indices, weights, _buffer_sizes);
+        Motion _e13 = dual_quaternion(_e11, _e12);
+        metal::float3 _e18 = gaussians[i_20].mean;
+        metal::float3 _e19 = rotate(_e13.rotation, _e18);
+        write_quaternion(i_20, _e19 + _e13.translation, _e13.rotation, params, gaussians, means, quaternions, relatives, views, _buffer_sizes);
         return;
     } else {
         return;
@@ -1331,9 +1284,9 @@ struct colourInput {
 kernel void colour(
   metal::uint3 id_10 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_16 const& views [[buffer(9)]]
-, device type_17 const& sh [[buffer(10)]]
-, device type_16& colours [[buffer(12)]]
+, device type_17 const& views [[buffer(9)]]
+, device type_18 const& sh [[buffer(10)]]
+, device type_17& colours [[buffer(12)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     metal::float3 rgb = {};
@@ -1342,34 +1295,34 @@ kernel void colour(
         return;
     }
     uint _e8 = params.first;
-    uint i_22 = _e8 + id_10.x;
-    metal::float4 _e13 = views[i_22];
+    uint i_21 = _e8 + id_10.x;
+    metal::float4 _e13 = views[i_21];
     metal::float3 d_5 = _e13.xyz;
-    metal::float3 _e19 = coefficient(i_22, 0u, params, sh, _buffer_sizes);
+    metal::float3 _e19 = coefficient(i_21, 0u, params, sh, _buffer_sizes);
     rgb = metal::float3(0.5) + (C0_ * _e19);
     uint _e25 = params.sh_degree;
     if (_e25 >= 1u) {
-        type_9 _e28 = band_1_(i_22, params, sh, _buffer_sizes);
+        type_10 _e28 = band_1_(i_21, params, sh, _buffer_sizes);
         metal::float3 _e29 = rgb;
         metal::float3 _e33 = sh_degree_1_(d_5, _e28.inner[0], _e28.inner[1], _e28.inner[2]);
         rgb = _e29 + _e33;
     }
     uint _e37 = params.sh_degree;
     if (_e37 >= 2u) {
-        type_10 _e40 = band_2_(i_22, params, sh, _buffer_sizes);
-        type_7 _e41 = basis_2_(d_5);
+        type_11 _e40 = band_2_(i_21, params, sh, _buffer_sizes);
+        type_8 _e41 = basis_2_(d_5);
         metal::float3 _e42 = rgb;
         rgb = _e42 + (((((_e41.inner[0] * _e40.inner[0]) + (_e41.inner[1] * _e40.inner[1])) + (_e41.inner[2] * _e40.inner[2])) + (_e41.inner[3] * _e40.inner[3])) + (_e41.inner[4] * _e40.inner[4]));
     }
     uint _e65 = params.sh_degree;
     if (_e65 >= 3u) {
-        type_11 _e68 = band_3_(i_22, params, sh, _buffer_sizes);
-        type_8 _e69 = basis_3_(d_5);
+        type_12 _e68 = band_3_(i_21, params, sh, _buffer_sizes);
+        type_9 _e69 = basis_3_(d_5);
         metal::float3 _e70 = rgb;
         rgb = _e70 + (((((((_e69.inner[0] * _e68.inner[0]) + (_e69.inner[1] * _e68.inner[1])) + (_e69.inner[2] * _e68.inner[2])) + (_e69.inner[3] * _e68.inner[3])) + (_e69.inner[4] * _e68.inner[4])) + (_e69.inner[5] * _e68.inner[5])) + (_e69.inner[6] * _e68.inner[6]));
     }
     metal::float3 _e101 = rgb;
-    colours[i_22] = metal::float4(metal::max(_e101, metal::float3(0.0)), 1.0);
+    colours[i_21] = metal::float4(metal::max(_e101, metal::float3(0.0)), 1.0);
     return;
 }
 
@@ -1379,9 +1332,9 @@ struct turn_shInput {
 kernel void turn_sh(
   metal::uint3 id_11 [[thread_position_in_grid]]
 , constant Params& params [[buffer(0)]]
-, device type_16 const& relatives [[buffer(8)]]
-, device type_17 const& sh [[buffer(10)]]
-, device type_17& turned_sh [[buffer(11)]]
+, device type_17 const& relatives [[buffer(8)]]
+, device type_18 const& sh [[buffer(10)]]
+, device type_18& turned_sh [[buffer(11)]]
 , constant _mslBufferSizes& _buffer_sizes [[buffer(13)]]
 ) {
     uint _e4 = params.count;
@@ -1389,40 +1342,40 @@ kernel void turn_sh(
         return;
     }
     uint _e8 = params.first;
-    uint i_23 = _e8 + id_11.x;
-    metal::float4 _e13 = relatives[i_23];
+    uint i_22 = _e8 + id_11.x;
+    metal::float4 _e13 = relatives[i_22];
     ShRotation _e14 = sh_rotation(_e13);
-    metal::float3 _e17 = coefficient(i_23, 0u, params, sh, _buffer_sizes);
-    write_coefficient(i_23, 0u, _e17, params, turned_sh, _buffer_sizes);
+    metal::float3 _e17 = coefficient(i_22, 0u, params, sh, _buffer_sizes);
+    write_coefficient(i_22, 0u, _e17, params, turned_sh, _buffer_sizes);
     uint _e20 = params.sh_degree;
     if (_e20 >= 1u) {
-        type_9 _e23 = band_1_(i_23, params, sh, _buffer_sizes);
-        type_9 _e24 = sh_turned_1_(_e23, _e14);
-        write_coefficient(i_23, 1u, _e24.inner[0], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 2u, _e24.inner[1], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 3u, _e24.inner[2], params, turned_sh, _buffer_sizes);
+        type_10 _e23 = band_1_(i_22, params, sh, _buffer_sizes);
+        type_10 _e24 = sh_turned_1_(_e23, _e14);
+        write_coefficient(i_22, 1u, _e24.inner[0], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 2u, _e24.inner[1], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 3u, _e24.inner[2], params, turned_sh, _buffer_sizes);
     }
     uint _e33 = params.sh_degree;
     if (_e33 >= 2u) {
-        type_10 _e36 = band_2_(i_23, params, sh, _buffer_sizes);
-        type_10 _e37 = sh_turned_2_(_e36, _e14);
-        write_coefficient(i_23, 4u, _e37.inner[0], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 5u, _e37.inner[1], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 6u, _e37.inner[2], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 7u, _e37.inner[3], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 8u, _e37.inner[4], params, turned_sh, _buffer_sizes);
+        type_11 _e36 = band_2_(i_22, params, sh, _buffer_sizes);
+        type_11 _e37 = sh_turned_2_(_e36, _e14);
+        write_coefficient(i_22, 4u, _e37.inner[0], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 5u, _e37.inner[1], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 6u, _e37.inner[2], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 7u, _e37.inner[3], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 8u, _e37.inner[4], params, turned_sh, _buffer_sizes);
     }
     uint _e50 = params.sh_degree;
     if (_e50 >= 3u) {
-        type_11 _e53 = band_3_(i_23, params, sh, _buffer_sizes);
-        type_11 _e54 = sh_turned_3_(_e53, _e14);
-        write_coefficient(i_23, 9u, _e54.inner[0], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 10u, _e54.inner[1], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 11u, _e54.inner[2], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 12u, _e54.inner[3], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 13u, _e54.inner[4], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 14u, _e54.inner[5], params, turned_sh, _buffer_sizes);
-        write_coefficient(i_23, 15u, _e54.inner[6], params, turned_sh, _buffer_sizes);
+        type_12 _e53 = band_3_(i_22, params, sh, _buffer_sizes);
+        type_12 _e54 = sh_turned_3_(_e53, _e14);
+        write_coefficient(i_22, 9u, _e54.inner[0], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 10u, _e54.inner[1], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 11u, _e54.inner[2], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 12u, _e54.inner[3], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 13u, _e54.inner[4], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 14u, _e54.inner[5], params, turned_sh, _buffer_sizes);
+        write_coefficient(i_22, 15u, _e54.inner[6], params, turned_sh, _buffer_sizes);
         return;
     } else {
         return;

@@ -42,6 +42,14 @@ struct Blend {
     float latest_weight;
     uint bones;
 };
+struct Sum {
+    vec4 real;
+    vec4 dual;
+};
+struct Motion {
+    vec4 rotation;
+    vec3 translation;
+};
 struct Covariance {
     vec3 first;
     vec3 second;
@@ -56,10 +64,6 @@ struct ShRotation {
     Turn beta;
     Turn alpha;
 };
-struct Motion {
-    vec4 rotation;
-    vec3 translation;
-};
 const float EPSILON = 1.1920929e-7;
 const vec4 IDENTITY = vec4(0.0, 0.0, 0.0, 1.0);
 const float RANK_ONE = 0.0002;
@@ -69,11 +73,11 @@ const float C1_ = 0.48860252;
 
 layout(std140, binding = 0) uniform Params_block_0Compute { Params _group_0_binding_0_cs; };
 
-layout(std430, binding = 9) buffer type_16_block_1Compute { vec4 _group_0_binding_9_cs[]; };
+layout(std430, binding = 9) buffer type_17_block_1Compute { vec4 _group_0_binding_9_cs[]; };
 
-layout(std430, binding = 10) readonly buffer type_17_block_2Compute { float _group_1_binding_0_cs[]; };
+layout(std430, binding = 10) readonly buffer type_18_block_2Compute { float _group_1_binding_0_cs[]; };
 
-layout(std430, binding = 12) buffer type_16_block_3Compute { vec4 _group_1_binding_2_cs[]; };
+layout(std430, binding = 12) buffer type_17_block_3Compute { vec4 _group_1_binding_2_cs[]; };
 
 
 vec4 multiply(vec4 a, vec4 b) {
@@ -378,6 +382,39 @@ vec4 power_steps(Blend blend_4, uint steps) {
     return _e26;
 }
 
+void take_aligned(inout Sum sum, vec4 rotation_1, vec3 translation_1, float weight_1, vec4 reference_1) {
+    if (!((weight_1 > 0.0))) {
+        return;
+    }
+    bool _e9 = is_opposite(rotation_1, reference_1);
+    float signed = (_e9 ? -(weight_1) : weight_1);
+    vec4 _e12 = sum.real;
+    sum.real = (_e12 + (signed * rotation_1));
+    vec4 _e16 = sum.dual;
+    vec4 _e19 = multiply(vec4(translation_1, 0.0), rotation_1);
+    sum.dual = (_e16 + (signed * _e19));
+    return;
+}
+
+vec4 aligned_sum(Blend blend_5, Sum sum_1) {
+    if ((blend_5.bones < 2u)) {
+        return blend_5.heaviest;
+    }
+    vec4 _e8 = normalized_or(sum_1.real, blend_5.heaviest);
+    return _e8;
+}
+
+Motion dual_quaternion(Blend blend_6, Sum sum_2) {
+    if ((blend_6.bones == 0u)) {
+        return Motion(vec4(0.0, 0.0, 0.0, 1.0), vec3(0.0));
+    }
+    vec4 _e15 = conjugate(sum_2.real);
+    vec4 _e16 = multiply(sum_2.dual, _e15);
+    vec3 translation_2 = (_e16.xyz / vec3(dot(sum_2.real, sum_2.real)));
+    vec4 _e25 = normalized_or(sum_2.real, blend_6.heaviest);
+    return Motion(_e25, translation_2);
+}
+
 Covariance covariance_of(vec4 q_5, vec3 s) {
     vec3 _e6 = rotate(q_5, vec3(s.x, 0.0, 0.0));
     vec3 _e11 = rotate(q_5, vec3(0.0, s.y, 0.0));
@@ -504,45 +541,40 @@ vec3[7] sh_turned_3_(vec3 c_9[7], ShRotation r_2) {
     return _e9;
 }
 
-vec4 doubled_dual(Joint joint_2) {
-    vec4 _e5 = multiply(vec4(joint_2.translation, 0.0), joint_2.rotation);
-    return _e5;
-}
-
-vec3 coefficient(uint i_7, uint k_5) {
+vec3 coefficient(uint i_6, uint k_4) {
     uint _e4 = _group_0_binding_0_cs.sh_stride;
     uint _e8 = _group_0_binding_0_cs.sh_coefficient_stride;
-    uint at = ((i_7 * _e4) + (k_5 * _e8));
+    uint at = ((i_6 * _e4) + (k_4 * _e8));
     float _e13 = _group_1_binding_0_cs[at];
     float _e18 = _group_1_binding_0_cs[(at + 1u)];
     float _e23 = _group_1_binding_0_cs[(at + 2u)];
     return vec3(_e13, _e18, _e23);
 }
 
-vec3[3] band_1_(uint i_9) {
-    vec3 _e2 = coefficient(i_9, 1u);
-    vec3 _e4 = coefficient(i_9, 2u);
-    vec3 _e6 = coefficient(i_9, 3u);
+vec3[3] band_1_(uint i_8) {
+    vec3 _e2 = coefficient(i_8, 1u);
+    vec3 _e4 = coefficient(i_8, 2u);
+    vec3 _e6 = coefficient(i_8, 3u);
     return vec3[3](_e2, _e4, _e6);
 }
 
-vec3[5] band_2_(uint i_10) {
-    vec3 _e2 = coefficient(i_10, 4u);
-    vec3 _e4 = coefficient(i_10, 5u);
-    vec3 _e6 = coefficient(i_10, 6u);
-    vec3 _e8 = coefficient(i_10, 7u);
-    vec3 _e10 = coefficient(i_10, 8u);
+vec3[5] band_2_(uint i_9) {
+    vec3 _e2 = coefficient(i_9, 4u);
+    vec3 _e4 = coefficient(i_9, 5u);
+    vec3 _e6 = coefficient(i_9, 6u);
+    vec3 _e8 = coefficient(i_9, 7u);
+    vec3 _e10 = coefficient(i_9, 8u);
     return vec3[5](_e2, _e4, _e6, _e8, _e10);
 }
 
-vec3[7] band_3_(uint i_11) {
-    vec3 _e2 = coefficient(i_11, 9u);
-    vec3 _e4 = coefficient(i_11, 10u);
-    vec3 _e6 = coefficient(i_11, 11u);
-    vec3 _e8 = coefficient(i_11, 12u);
-    vec3 _e10 = coefficient(i_11, 13u);
-    vec3 _e12 = coefficient(i_11, 14u);
-    vec3 _e14 = coefficient(i_11, 15u);
+vec3[7] band_3_(uint i_10) {
+    vec3 _e2 = coefficient(i_10, 9u);
+    vec3 _e4 = coefficient(i_10, 10u);
+    vec3 _e6 = coefficient(i_10, 11u);
+    vec3 _e8 = coefficient(i_10, 12u);
+    vec3 _e10 = coefficient(i_10, 13u);
+    vec3 _e12 = coefficient(i_10, 14u);
+    vec3 _e14 = coefficient(i_10, 15u);
     return vec3[7](_e2, _e4, _e6, _e8, _e10, _e12, _e14);
 }
 
@@ -554,33 +586,33 @@ void main() {
         return;
     }
     uint _e8 = _group_0_binding_0_cs.first;
-    uint i_12 = (_e8 + id_10.x);
-    vec4 _e13 = _group_0_binding_9_cs[i_12];
+    uint i_11 = (_e8 + id_10.x);
+    vec4 _e13 = _group_0_binding_9_cs[i_11];
     vec3 d_5 = _e13.xyz;
-    vec3 _e19 = coefficient(i_12, 0u);
+    vec3 _e19 = coefficient(i_11, 0u);
     rgb = (vec3(0.5) + (C0_ * _e19));
     uint _e25 = _group_0_binding_0_cs.sh_degree;
     if ((_e25 >= 1u)) {
-        vec3 _e28[3] = band_1_(i_12);
+        vec3 _e28[3] = band_1_(i_11);
         vec3 _e29 = rgb;
         vec3 _e33 = sh_degree_1_(d_5, _e28[0], _e28[1], _e28[2]);
         rgb = (_e29 + _e33);
     }
     uint _e37 = _group_0_binding_0_cs.sh_degree;
     if ((_e37 >= 2u)) {
-        vec3 _e40[5] = band_2_(i_12);
+        vec3 _e40[5] = band_2_(i_11);
         float _e41[5] = basis_2_(d_5);
         vec3 _e42 = rgb;
         rgb = (_e42 + (((((_e41[0] * _e40[0]) + (_e41[1] * _e40[1])) + (_e41[2] * _e40[2])) + (_e41[3] * _e40[3])) + (_e41[4] * _e40[4])));
     }
     uint _e65 = _group_0_binding_0_cs.sh_degree;
     if ((_e65 >= 3u)) {
-        vec3 _e68[7] = band_3_(i_12);
+        vec3 _e68[7] = band_3_(i_11);
         float _e69[7] = basis_3_(d_5);
         vec3 _e70 = rgb;
         rgb = (_e70 + (((((((_e69[0] * _e68[0]) + (_e69[1] * _e68[1])) + (_e69[2] * _e68[2])) + (_e69[3] * _e68[3])) + (_e69[4] * _e68[4])) + (_e69[5] * _e68[5])) + (_e69[6] * _e68[6])));
     }
     vec3 _e101 = rgb;
-    _group_1_binding_2_cs[i_12] = vec4(max(_e101, vec3(0.0)), 1.0);
+    _group_1_binding_2_cs[i_11] = vec4(max(_e101, vec3(0.0)), 1.0);
     return;
 }

@@ -42,6 +42,14 @@ struct Blend {
     float latest_weight;
     uint bones;
 };
+struct Sum {
+    vec4 real;
+    vec4 dual;
+};
+struct Motion {
+    vec4 rotation;
+    vec3 translation;
+};
 struct Covariance {
     vec3 first;
     vec3 second;
@@ -56,10 +64,6 @@ struct ShRotation {
     Turn beta;
     Turn alpha;
 };
-struct Motion {
-    vec4 rotation;
-    vec3 translation;
-};
 const float EPSILON = 1.1920929e-7;
 const vec4 IDENTITY = vec4(0.0, 0.0, 0.0, 1.0);
 const float RANK_ONE = 0.0002;
@@ -69,21 +73,21 @@ const float C1_ = 0.48860252;
 
 layout(std140, binding = 0) uniform Params_block_0Compute { Params _group_0_binding_0_cs; };
 
-layout(std430, binding = 1) readonly buffer type_12_block_1Compute { Joint _group_0_binding_1_cs[]; };
+layout(std430, binding = 1) readonly buffer type_13_block_1Compute { Joint _group_0_binding_1_cs[]; };
 
-layout(std430, binding = 2) readonly buffer type_13_block_2Compute { Gaussian _group_0_binding_2_cs[]; };
+layout(std430, binding = 2) readonly buffer type_14_block_2Compute { Gaussian _group_0_binding_2_cs[]; };
 
-layout(std430, binding = 3) readonly buffer type_15_block_3Compute { uvec4 _group_0_binding_3_cs[]; };
+layout(std430, binding = 3) readonly buffer type_16_block_3Compute { uvec4 _group_0_binding_3_cs[]; };
 
-layout(std430, binding = 4) readonly buffer type_16_block_4Compute { vec4 _group_0_binding_4_cs[]; };
+layout(std430, binding = 4) readonly buffer type_17_block_4Compute { vec4 _group_0_binding_4_cs[]; };
 
-layout(std430, binding = 5) buffer type_16_block_5Compute { vec4 _group_0_binding_5_cs[]; };
+layout(std430, binding = 5) buffer type_17_block_5Compute { vec4 _group_0_binding_5_cs[]; };
 
-layout(std430, binding = 6) buffer type_17_block_6Compute { float _group_0_binding_6_cs[]; };
+layout(std430, binding = 6) buffer type_18_block_6Compute { float _group_0_binding_6_cs[]; };
 
-layout(std430, binding = 8) buffer type_16_block_7Compute { vec4 _group_0_binding_8_cs[]; };
+layout(std430, binding = 8) buffer type_17_block_7Compute { vec4 _group_0_binding_8_cs[]; };
 
-layout(std430, binding = 9) buffer type_16_block_8Compute { vec4 _group_0_binding_9_cs[]; };
+layout(std430, binding = 9) buffer type_17_block_8Compute { vec4 _group_0_binding_9_cs[]; };
 
 
 vec4 multiply(vec4 a, vec4 b) {
@@ -388,6 +392,39 @@ vec4 power_steps(Blend blend_4, uint steps) {
     return _e26;
 }
 
+void take_aligned(inout Sum sum, vec4 rotation_1, vec3 translation_1, float weight_1, vec4 reference_1) {
+    if (!((weight_1 > 0.0))) {
+        return;
+    }
+    bool _e9 = is_opposite(rotation_1, reference_1);
+    float signed = (_e9 ? -(weight_1) : weight_1);
+    vec4 _e12 = sum.real;
+    sum.real = (_e12 + (signed * rotation_1));
+    vec4 _e16 = sum.dual;
+    vec4 _e19 = multiply(vec4(translation_1, 0.0), rotation_1);
+    sum.dual = (_e16 + (signed * _e19));
+    return;
+}
+
+vec4 aligned_sum(Blend blend_5, Sum sum_1) {
+    if ((blend_5.bones < 2u)) {
+        return blend_5.heaviest;
+    }
+    vec4 _e8 = normalized_or(sum_1.real, blend_5.heaviest);
+    return _e8;
+}
+
+Motion dual_quaternion(Blend blend_6, Sum sum_2) {
+    if ((blend_6.bones == 0u)) {
+        return Motion(vec4(0.0, 0.0, 0.0, 1.0), vec3(0.0));
+    }
+    vec4 _e15 = conjugate(sum_2.real);
+    vec4 _e16 = multiply(sum_2.dual, _e15);
+    vec3 translation_2 = (_e16.xyz / vec3(dot(sum_2.real, sum_2.real)));
+    vec4 _e25 = normalized_or(sum_2.real, blend_6.heaviest);
+    return Motion(_e25, translation_2);
+}
+
 Covariance covariance_of(vec4 q_5, vec3 s) {
     vec3 _e6 = rotate(q_5, vec3(s.x, 0.0, 0.0));
     vec3 _e11 = rotate(q_5, vec3(0.0, s.y, 0.0));
@@ -515,10 +552,10 @@ vec3[7] sh_turned_3_(vec3 c_9[7], ShRotation r_2) {
 }
 
 Blend gathered(uint i) {
-    Blend blend_5 = Blend(Symmetric(vec4(0.0), vec3(0.0), vec3(0.0)), vec3(0.0), 0.0, vec4(0.0), 0.0, vec4(0.0), 0.0, vec4(0.0), 0.0, 0u);
+    Blend blend_7 = Blend(Symmetric(vec4(0.0), vec3(0.0), vec3(0.0)), vec3(0.0), 0.0, vec4(0.0), 0.0, vec4(0.0), 0.0, vec4(0.0), 0.0, 0u);
     uint k_2 = 0u;
     Blend _e1 = empty_blend();
-    blend_5 = _e1;
+    blend_7 = _e1;
     bool loop_init_2 = true;
     while(true) {
         if (!loop_init_2) {
@@ -535,122 +572,59 @@ Blend gathered(uint i) {
         {
             uint _e13 = _group_0_binding_0_cs.influence_sets;
             uint _e15 = k_2;
-            uvec4 joint_3 = _group_0_binding_3_cs[((i * _e13) + _e15)];
+            uvec4 joint = _group_0_binding_3_cs[((i * _e13) + _e15)];
             uint _e22 = _group_0_binding_0_cs.influence_sets;
             uint _e24 = k_2;
-            vec4 weight_3 = _group_0_binding_4_cs[((i * _e22) + _e24)];
-            vec4 _e32 = _group_0_binding_1_cs[joint_3.x].rotation;
-            vec3 _e37 = _group_0_binding_1_cs[joint_3.x].translation;
-            take(blend_5, _e32, _e37, weight_3.x);
-            vec4 _e43 = _group_0_binding_1_cs[joint_3.y].rotation;
-            vec3 _e48 = _group_0_binding_1_cs[joint_3.y].translation;
-            take(blend_5, _e43, _e48, weight_3.y);
-            vec4 _e54 = _group_0_binding_1_cs[joint_3.z].rotation;
-            vec3 _e59 = _group_0_binding_1_cs[joint_3.z].translation;
-            take(blend_5, _e54, _e59, weight_3.z);
-            vec4 _e65 = _group_0_binding_1_cs[joint_3.w].rotation;
-            vec3 _e70 = _group_0_binding_1_cs[joint_3.w].translation;
-            take(blend_5, _e65, _e70, weight_3.w);
+            vec4 weight_2 = _group_0_binding_4_cs[((i * _e22) + _e24)];
+            vec4 _e32 = _group_0_binding_1_cs[joint.x].rotation;
+            vec3 _e37 = _group_0_binding_1_cs[joint.x].translation;
+            take(blend_7, _e32, _e37, weight_2.x);
+            vec4 _e43 = _group_0_binding_1_cs[joint.y].rotation;
+            vec3 _e48 = _group_0_binding_1_cs[joint.y].translation;
+            take(blend_7, _e43, _e48, weight_2.y);
+            vec4 _e54 = _group_0_binding_1_cs[joint.z].rotation;
+            vec3 _e59 = _group_0_binding_1_cs[joint.z].translation;
+            take(blend_7, _e54, _e59, weight_2.z);
+            vec4 _e65 = _group_0_binding_1_cs[joint.w].rotation;
+            vec3 _e70 = _group_0_binding_1_cs[joint.w].translation;
+            take(blend_7, _e65, _e70, weight_2.w);
         }
     }
-    Blend _e75 = blend_5;
+    Blend _e75 = blend_7;
     return _e75;
 }
 
 Blend gathered_two(uint i_1) {
-    Blend blend_6 = Blend(Symmetric(vec4(0.0), vec3(0.0), vec3(0.0)), vec3(0.0), 0.0, vec4(0.0), 0.0, vec4(0.0), 0.0, vec4(0.0), 0.0, 0u);
+    Blend blend_8 = Blend(Symmetric(vec4(0.0), vec3(0.0), vec3(0.0)), vec3(0.0), 0.0, vec4(0.0), 0.0, vec4(0.0), 0.0, vec4(0.0), 0.0, 0u);
     Blend _e1 = empty_blend();
-    blend_6 = _e1;
+    blend_8 = _e1;
     uint _e6 = _group_0_binding_0_cs.influence_sets;
     uvec4 _e9 = _group_0_binding_3_cs[(i_1 * _e6)];
-    uvec2 joint_4 = _e9.xy;
+    uvec2 joint_1 = _e9.xy;
     uint _e14 = _group_0_binding_0_cs.influence_sets;
     vec4 _e17 = _group_0_binding_4_cs[(i_1 * _e14)];
-    vec2 weight_4 = _e17.xy;
-    vec4 _e23 = _group_0_binding_1_cs[joint_4.x].rotation;
-    vec3 _e28 = _group_0_binding_1_cs[joint_4.x].translation;
-    take(blend_6, _e23, _e28, weight_4.x);
-    vec4 _e34 = _group_0_binding_1_cs[joint_4.y].rotation;
-    vec3 _e39 = _group_0_binding_1_cs[joint_4.y].translation;
-    take(blend_6, _e34, _e39, weight_4.y);
-    Blend _e41 = blend_6;
+    vec2 weight_3 = _e17.xy;
+    vec4 _e23 = _group_0_binding_1_cs[joint_1.x].rotation;
+    vec3 _e28 = _group_0_binding_1_cs[joint_1.x].translation;
+    take(blend_8, _e23, _e28, weight_3.x);
+    vec4 _e34 = _group_0_binding_1_cs[joint_1.y].rotation;
+    vec3 _e39 = _group_0_binding_1_cs[joint_1.y].translation;
+    take(blend_8, _e34, _e39, weight_3.y);
+    Blend _e41 = blend_8;
     return _e41;
 }
 
-float signed_weight(uint joint, float weight_1, vec4 reference_1) {
-    if (!((weight_1 > 0.0))) {
-        return 0.0;
-    }
-    vec4 _e11 = _group_0_binding_1_cs[joint].rotation;
-    bool _e12 = is_opposite(_e11, reference_1);
-    return (_e12 ? -(weight_1) : weight_1);
-}
-
-vec4 signed_weights(uvec4 joint_1, vec4 weight_2, vec4 reference_2) {
-    float _e5 = signed_weight(joint_1.x, weight_2.x, reference_2);
-    float _e8 = signed_weight(joint_1.y, weight_2.y, reference_2);
-    float _e11 = signed_weight(joint_1.z, weight_2.z, reference_2);
-    float _e14 = signed_weight(joint_1.w, weight_2.w, reference_2);
-    return vec4(_e5, _e8, _e11, _e14);
-}
-
-vec4 aligned_sum(uint i_2, Blend blend_7) {
-    vec4 sum = vec4(0.0);
+Sum summed(uint i_2, Blend blend_9) {
+    Sum sum_3 = Sum(vec4(0.0), vec4(0.0));
     uint k_3 = 0u;
-    if ((blend_7.bones < 2u)) {
-        return blend_7.heaviest;
-    }
     bool loop_init_3 = true;
     while(true) {
         if (!loop_init_3) {
-            uint _e69 = k_3;
-            k_3 = (_e69 + 1u);
+            uint _e81 = k_3;
+            k_3 = (_e81 + 1u);
         }
         loop_init_3 = false;
-        uint _e11 = k_3;
-        uint _e14 = _group_0_binding_0_cs.influence_sets;
-        if ((_e11 < _e14)) {
-        } else {
-            break;
-        }
-        {
-            uint _e19 = _group_0_binding_0_cs.influence_sets;
-            uint _e21 = k_3;
-            uvec4 joint_5 = _group_0_binding_3_cs[((i_2 * _e19) + _e21)];
-            uint _e28 = _group_0_binding_0_cs.influence_sets;
-            uint _e30 = k_3;
-            vec4 _e33 = _group_0_binding_4_cs[((i_2 * _e28) + _e30)];
-            vec4 _e35 = signed_weights(joint_5, _e33, blend_7.heaviest);
-            vec4 _e36 = sum;
-            vec4 _e42 = _group_0_binding_1_cs[joint_5.x].rotation;
-            vec4 _e49 = _group_0_binding_1_cs[joint_5.y].rotation;
-            vec4 _e57 = _group_0_binding_1_cs[joint_5.z].rotation;
-            vec4 _e64 = _group_0_binding_1_cs[joint_5.w].rotation;
-            sum = (_e36 + (((_e35.x * _e42) + (_e35.y * _e49)) + ((_e35.z * _e57) + (_e35.w * _e64))));
-        }
-    }
-    vec4 _e72 = sum;
-    vec4 _e74 = normalized_or(_e72, blend_7.heaviest);
-    return _e74;
-}
-
-vec4 doubled_dual(Joint joint_2) {
-    vec4 _e5 = multiply(vec4(joint_2.translation, 0.0), joint_2.rotation);
-    return _e5;
-}
-
-Motion dual_quaternion(uint i_3, Blend blend_8) {
-    vec4 real = vec4(0.0);
-    vec4 dual = vec4(0.0);
-    uint k_4 = 0u;
-    bool loop_init_4 = true;
-    while(true) {
-        if (!loop_init_4) {
-            uint _e101 = k_4;
-            k_4 = (_e101 + 1u);
-        }
-        loop_init_4 = false;
-        uint _e10 = k_4;
+        uint _e10 = k_3;
         uint _e13 = _group_0_binding_0_cs.influence_sets;
         if ((_e10 < _e13)) {
         } else {
@@ -658,69 +632,54 @@ Motion dual_quaternion(uint i_3, Blend blend_8) {
         }
         {
             uint _e18 = _group_0_binding_0_cs.influence_sets;
-            uint _e20 = k_4;
-            uvec4 joint_6 = _group_0_binding_3_cs[((i_3 * _e18) + _e20)];
+            uint _e20 = k_3;
+            uvec4 joint_2 = _group_0_binding_3_cs[((i_2 * _e18) + _e20)];
             uint _e27 = _group_0_binding_0_cs.influence_sets;
-            uint _e29 = k_4;
-            vec4 _e32 = _group_0_binding_4_cs[((i_3 * _e27) + _e29)];
-            vec4 _e34 = signed_weights(joint_6, _e32, blend_8.heaviest);
-            vec4 _e35 = real;
-            vec4 _e41 = _group_0_binding_1_cs[joint_6.x].rotation;
-            vec4 _e48 = _group_0_binding_1_cs[joint_6.y].rotation;
-            vec4 _e56 = _group_0_binding_1_cs[joint_6.z].rotation;
-            vec4 _e63 = _group_0_binding_1_cs[joint_6.w].rotation;
-            real = (_e35 + (((_e34.x * _e41) + (_e34.y * _e48)) + ((_e34.z * _e56) + (_e34.w * _e63))));
-            vec4 _e68 = dual;
-            Joint _e73 = _group_0_binding_1_cs[joint_6.x];
-            vec4 _e74 = doubled_dual(_e73);
-            Joint _e80 = _group_0_binding_1_cs[joint_6.y];
-            vec4 _e81 = doubled_dual(_e80);
-            Joint _e88 = _group_0_binding_1_cs[joint_6.z];
-            vec4 _e89 = doubled_dual(_e88);
-            Joint _e95 = _group_0_binding_1_cs[joint_6.w];
-            vec4 _e96 = doubled_dual(_e95);
-            dual = (_e68 + (((_e34.x * _e74) + (_e34.y * _e81)) + ((_e34.z * _e89) + (_e34.w * _e96))));
+            uint _e29 = k_3;
+            vec4 weight_4 = _group_0_binding_4_cs[((i_2 * _e27) + _e29)];
+            vec4 _e37 = _group_0_binding_1_cs[joint_2.x].rotation;
+            vec3 _e42 = _group_0_binding_1_cs[joint_2.x].translation;
+            take_aligned(sum_3, _e37, _e42, weight_4.x, blend_9.heaviest);
+            vec4 _e49 = _group_0_binding_1_cs[joint_2.y].rotation;
+            vec3 _e54 = _group_0_binding_1_cs[joint_2.y].translation;
+            take_aligned(sum_3, _e49, _e54, weight_4.y, blend_9.heaviest);
+            vec4 _e61 = _group_0_binding_1_cs[joint_2.z].rotation;
+            vec3 _e66 = _group_0_binding_1_cs[joint_2.z].translation;
+            take_aligned(sum_3, _e61, _e66, weight_4.z, blend_9.heaviest);
+            vec4 _e73 = _group_0_binding_1_cs[joint_2.w].rotation;
+            vec3 _e78 = _group_0_binding_1_cs[joint_2.w].translation;
+            take_aligned(sum_3, _e73, _e78, weight_4.w, blend_9.heaviest);
         }
     }
-    if ((blend_8.bones == 0u)) {
-        return Motion(vec4(0.0, 0.0, 0.0, 1.0), vec3(0.0));
-    }
-    vec4 _e115 = real;
-    vec4 _e117 = normalized_or(_e115, blend_8.heaviest);
-    vec4 _e118 = dual;
-    vec4 _e119 = real;
-    vec4 _e120 = conjugate(_e119);
-    vec4 _e121 = multiply(_e118, _e120);
-    vec4 _e123 = real;
-    vec4 _e124 = real;
-    return Motion(_e117, (_e121.xyz / vec3(dot(_e123, _e124))));
+    Sum _e84 = sum_3;
+    return _e84;
 }
 
-void write_motion(uint i_4, vec3 mean, vec4 relative) {
-    _group_0_binding_5_cs[i_4] = vec4(mean, 1.0);
-    _group_0_binding_8_cs[i_4] = relative;
+void write_motion(uint i_3, vec3 mean, vec4 relative) {
+    _group_0_binding_5_cs[i_3] = vec4(mean, 1.0);
+    _group_0_binding_8_cs[i_3] = relative;
     vec3 _e11 = _group_0_binding_0_cs.camera;
     vec3 view = (mean - _e11);
     float distance_ = length(view);
     vec3 unit = ((distance_ == 0.0) ? vec3(0.0, 0.0, 1.0) : (view / vec3(distance_)));
     vec4 _e25 = conjugate(relative);
     vec3 _e26 = rotate(_e25, unit);
-    _group_0_binding_9_cs[i_4] = vec4(_e26, 0.0);
+    _group_0_binding_9_cs[i_3] = vec4(_e26, 0.0);
     return;
 }
 
-void write_covariance(uint i_5, vec3 mean_1, vec4 relative_1) {
-    write_motion(i_5, mean_1, relative_1);
-    vec4 _e6 = _group_0_binding_2_cs[i_5].rotation;
+void write_covariance(uint i_4, vec3 mean_1, vec4 relative_1) {
+    write_motion(i_4, mean_1, relative_1);
+    vec4 _e6 = _group_0_binding_2_cs[i_4].rotation;
     vec4 _e7 = multiply(relative_1, _e6);
-    vec3 _e11 = _group_0_binding_2_cs[i_5].scale;
+    vec3 _e11 = _group_0_binding_2_cs[i_4].scale;
     Covariance _e12 = covariance_of(_e7, _e11);
-    _group_0_binding_6_cs[(6u * i_5)] = _e12.first.x;
-    _group_0_binding_6_cs[((6u * i_5) + 1u)] = _e12.first.y;
-    _group_0_binding_6_cs[((6u * i_5) + 2u)] = _e12.first.z;
-    _group_0_binding_6_cs[((6u * i_5) + 3u)] = _e12.second.x;
-    _group_0_binding_6_cs[((6u * i_5) + 4u)] = _e12.second.y;
-    _group_0_binding_6_cs[((6u * i_5) + 5u)] = _e12.second.z;
+    _group_0_binding_6_cs[(6u * i_4)] = _e12.first.x;
+    _group_0_binding_6_cs[((6u * i_4) + 1u)] = _e12.first.y;
+    _group_0_binding_6_cs[((6u * i_4) + 2u)] = _e12.first.z;
+    _group_0_binding_6_cs[((6u * i_4) + 3u)] = _e12.second.x;
+    _group_0_binding_6_cs[((6u * i_4) + 4u)] = _e12.second.y;
+    _group_0_binding_6_cs[((6u * i_4) + 5u)] = _e12.second.z;
     return;
 }
 
@@ -729,12 +688,13 @@ void main() {
     uint _e4 = _group_0_binding_0_cs.count;
     if ((id_8.x < _e4)) {
         uint _e8 = _group_0_binding_0_cs.first;
-        uint i_12 = (_e8 + id_8.x);
-        Blend _e11 = gathered(i_12);
-        Motion _e12 = dual_quaternion(i_12, _e11);
-        vec3 _e17 = _group_0_binding_2_cs[i_12].mean;
-        vec3 _e18 = rotate(_e12.rotation, _e17);
-        write_covariance(i_12, (_e18 + _e12.translation), _e12.rotation);
+        uint i_11 = (_e8 + id_8.x);
+        Blend _e11 = gathered(i_11);
+        Sum _e12 = summed(i_11, _e11);
+        Motion _e13 = dual_quaternion(_e11, _e12);
+        vec3 _e18 = _group_0_binding_2_cs[i_11].mean;
+        vec3 _e19 = rotate(_e13.rotation, _e18);
+        write_covariance(i_11, (_e19 + _e13.translation), _e13.rotation);
         return;
     } else {
         return;
