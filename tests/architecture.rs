@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const MODULES: [&str; 4] = ["datasets", "experiment", "run", "report"];
 
 /// The crates, and what each may be built on. Tests and examples may use more.
-const CRATES: [(&str, &[&str]); 17] = [
+const CRATES: [(&str, &[&str]); 18] = [
     ("core", &[]),
     ("simd", &[]),
     ("table", &[]),
@@ -22,6 +22,7 @@ const CRATES: [(&str, &[&str]); 17] = [
     ("statistics", &["core"]),
     ("conform", &["core", "data"]),
     ("shader", &["core"]),
+    ("view", &["core", "shader"]),
     ("synthetic", &["core", "data", "render"]),
     ("check", &["core", "data", "render"]),
     ("fit", &["core", "simd", "data", "posing", "render"]),
@@ -41,7 +42,7 @@ const HOMES: [(&str, &[&str]); 15] = [
     ("hdf5_pure::", &["crates/data/src/hdf5.rs"]),
     ("tiff::", &["crates/data/src/depth.rs"]),
     ("zip::", &["crates/data"]),
-    ("half::", &["crates/data", "crates/study"]),
+    ("half::", &["crates/data", "crates/study", "crates/view"]),
     ("plotters::", &["crates/plot"]),
     ("maud::", &["crates/page"]),
     ("gif::", &["src/run/pictures.rs"]),
