@@ -39,4 +39,5 @@ mod scoring;
 mod scoring_inputs;
 mod stressing;
 mod usage;
+mod viewing;
 mod widths;

@@ -19,6 +19,23 @@ fill(element("choice-a"), "average");
 fill(element("choice-b"), "gram-schmidt");
 element("frame").max = meta.frames - 1;
 
+// Controls as the address asks for them, by their ids: #mode=side&choice-b=dual&frame=12&mark=true&turn=0.5
+function fromAddress() {
+  const asked = new URLSearchParams(location.hash.slice(1));
+  for (const [id, value] of asked) {
+    const control = element(id);
+    if (id === "turn" || id === "tilt") camera[id] = Number(value) || 0;
+    else if (control && control.type === "checkbox") control.checked = value === "true";
+    else if (control && control.form && "value" in control && control.type !== "button") control.value = value;
+  }
+  if (asked.has("frame")) {
+    state.frame = Number(element("frame").value);
+    state.playing = false;
+  }
+  camera.update();
+}
+fromAddress();
+
 const number = (id, least, most, otherwise) => {
   const value = Number(element(id).value);
   return Number.isFinite(value) && element(id).value !== "" ? Math.min(Math.max(value, least), most) : otherwise;
