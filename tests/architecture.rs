@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const MODULES: [&str; 4] = ["datasets", "experiment", "run", "report"];
 
 /// The crates, and what each may be built on. Tests and examples may use more.
-const CRATES: [(&str, &[&str]); 16] = [
+const CRATES: [(&str, &[&str]); 18] = [
     ("core", &[]),
     ("simd", &[]),
     ("table", &[]),
@@ -21,6 +21,8 @@ const CRATES: [(&str, &[&str]); 16] = [
     ("data", &["core"]),
     ("statistics", &["core"]),
     ("conform", &["core", "data"]),
+    ("shader", &["core"]),
+    ("view", &["core", "shader"]),
     ("synthetic", &["core", "data", "render"]),
     ("check", &["core", "data", "render"]),
     ("fit", &["core", "simd", "data", "posing", "render"]),
@@ -31,9 +33,9 @@ const CRATES: [(&str, &[&str]); 16] = [
 ];
 
 /// Libraries that belong to one place: everything else stays free of them.
-const HOMES: [(&str, &[&str]); 14] = [
+const HOMES: [(&str, &[&str]); 16] = [
     ("signal_hook::", &["src/cli/interrupt.rs"]),
-    ("clap::", &["src/cli"]),
+    ("clap::", &["src/cli", "crates/shader/src/bin"]),
     ("indicatif::", &["src/cli"]),
     ("anyhow::", &["src/cli"]),
     ("gltf::", &["crates/data"]),
@@ -41,11 +43,13 @@ const HOMES: [(&str, &[&str]); 14] = [
     ("hdf5_pure::", &["crates/data/src/hdf5.rs"]),
     ("tiff::", &["crates/data/src/depth.rs"]),
     ("zip::", &["crates/data"]),
-    ("half::", &["crates/data", "crates/study"]),
+    ("half::", &["crates/data", "crates/study", "crates/view"]),
     ("plotters::", &["crates/plot"]),
     ("maud::", &["crates/page"]),
     ("gif::", &["src/run/pictures.rs"]),
     ("quick_junit::", &["src/report"]),
+    ("wgpu::", &["crates/shader/src/gpu"]),
+    ("naga::", &["crates/shader/src/translate.rs"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

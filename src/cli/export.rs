@@ -166,7 +166,7 @@ fn of_degree(gaussians: &Gaussians, degree: Option<u8>) -> Gaussians {
 
 /// The avatar with skinning weights of each Gaussian's own, and what is lost by that. Gaussians on faces take the mix of the
 /// weights of the corners and the place where the rest body has them.
-fn by_weights(avatar: &Avatar, rest: &RestBody) -> Result<(Avatar, Option<&'static str>)> {
+pub(super) fn by_weights(avatar: &Avatar, rest: &RestBody) -> Result<(Avatar, Option<&'static str>)> {
     let Binding::Face(binding) = &avatar.binding else { return Ok((avatar.clone(), None)) };
     let row = |i: usize| {
         let clamped = binding.barycentric[i].map(|b| f64::from(b.max(0.0)));

@@ -33,6 +33,7 @@ mod skin;
 mod stress;
 mod tolerances;
 mod trade;
+mod view;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -74,6 +75,7 @@ enum Command {
     Render(render::Render),
     Skin(skin::Skin),
     Export(export::Export),
+    View(view::View),
     Score(score::Score),
     Blend(blend::Blend),
     Trade(trade::Trading),
@@ -180,6 +182,7 @@ impl Command {
             Self::Render(command) => command.run(context),
             Self::Skin(command) => command.run(context),
             Self::Export(command) => command.run(context),
+            Self::View(command) => command.run(context),
             Self::Score(command) => command.run(context),
             Self::Blend(command) => command.run(),
             Self::Trade(command) => command.run(context),

@@ -65,6 +65,12 @@ impl Posing {
         self.strategy
     }
 
+    /// The option that chooses a pose or a strategy, if one does: for commands that take all.
+    pub(super) fn chosen(&self) -> Option<&'static str> {
+        let strategy = Strategy::preset("quaternion-average").is_some_and(|default| default != self.strategy);
+        if self.frame != 0 { Some("--frame") } else { strategy.then_some("--strategy") }
+    }
+
     /// True if a body was named.
     pub(super) fn has_body(&self) -> bool {
         self.body.is_some()
@@ -187,6 +193,11 @@ impl Subject {
         let (rest, pose) = self.rest.as_ref()?;
         let poses = self.before.iter().chain([pose]).collect();
         Some(Track { rest, poses, framerate: self.framerate.unwrap_or(30.0) })
+    }
+
+    /// A mesh is drawn with the Gaussians.
+    pub(super) fn has_mesh(&self) -> bool {
+        self.mesh.is_some()
     }
 
     /// What has to be said of avatar, body and poses, a line each.

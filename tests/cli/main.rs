@@ -41,4 +41,5 @@ mod scoring_inputs;
 mod streams;
 mod stressing;
 mod usage;
+mod viewing;
 mod widths;

@@ -4,7 +4,7 @@ use crate::args;
 use crate::program::Desk;
 use std::process::{Command, Stdio};
 
-const SUBCOMMANDS: [&str; 18] = [
+const SUBCOMMANDS: [&str; 19] = [
     "run",
     "merge",
     "batch",
@@ -16,6 +16,7 @@ const SUBCOMMANDS: [&str; 18] = [
     "render",
     "skin",
     "export",
+    "view",
     "score",
     "blend",
     "trade",
@@ -46,6 +47,8 @@ fn top_level_help() {
       render       Render an avatar, posed or as it stands
       skin         Pose an avatar and write a plain static 3DGS PLY
       export       Write an avatar as files that other programs open: posed PLY, posed GLB, skinned GLB
+      view         Write an avatar in motion as one HTML page: rotations switched live, side by side,
+                   marked by their distance from the average
       score        Score renders against truth: two images, or two folders whose frames pair up by name
       blend        Blend rotations with every solver: check a shader or an engine against the exact
                    answer

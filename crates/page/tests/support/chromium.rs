@@ -60,7 +60,7 @@ impl Chromium {
         };
         let profile = tempfile::tempdir().unwrap();
         let arguments = format!(
-            "exec {name} --headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --no-first-run --remote-debugging-pipe \
+            "exec {name} --headless=new --no-sandbox --disable-gpu --enable-unsafe-swiftshader --disable-dev-shm-usage --no-first-run --remote-debugging-pipe \
              --user-data-dir={} about:blank 3<&0 4>&1 1>/dev/null 2>/dev/null",
             profile.path().display()
         );
