@@ -2,6 +2,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 mod answer;
+mod blends;
 mod change;
 mod check;
 mod convention;

@@ -3,10 +3,11 @@
 //!
 //! [`Posed`]: skinsplat_core::scene::Posed
 
+mod check;
+
 use super::body_adjoint::{self, OfBody};
 use super::bound::Moves;
 use super::covariance::CovarianceGradient;
-use super::error::expect_count;
 use super::frame::{Frame, Visitor};
 use super::lanes::{self, LANES, Lanes, put, take};
 use super::layout::{Block, CHUNK};
@@ -14,11 +15,11 @@ use super::options::Gradients;
 use super::push_forward::Derivative;
 use super::rotate::{BlockInput, Rotated, drawn_adjoint, means_adjoint, polar_adjoint, rotation_adjoint};
 use super::surfel::Disc;
-use super::{Across, BoundAvatar, ColourChoice, CovarianceChoice, PosingError, colour, covariance};
+use super::{Across, ColourChoice, CovarianceChoice, PosingError, colour, covariance};
 use glam::Vec3;
 use rayon::prelude::*;
 use skinsplat_core::math::{Matrix3, Quaternion, dot4, matrix3, rotation};
-use skinsplat_core::scene::{AvatarGradient, BodyGradient, Gaussians, PosedGradient, SceneError};
+use skinsplat_core::scene::{AvatarGradient, Gaussians, PosedGradient};
 
 /// Adds to `into` what the pose of a frame contributes. See [`Poser::backward`](super::Poser::backward).
 pub(super) fn add(
@@ -28,12 +29,12 @@ pub(super) fn add(
     into: Gradients<'_>,
 ) -> Result<(), PosingError> {
     let Gradients { avatar, body } = into;
-    check(frame.bound, upstream)?;
+    check::upstream(frame.bound, upstream)?;
     if let Some(gradient) = &avatar {
-        check_avatar(frame.bound, gaussians, gradient)?;
+        check::avatar(frame.bound, gaussians, gradient)?;
     }
     if let Some(gradient) = &body {
-        check_body(frame, gradient)?;
+        check::body(frame, gradient)?;
     }
     let count = frame.bound.len().div_ceil(CHUNK);
     let parts: Vec<Option<Part<'_>>> = match avatar {
@@ -66,43 +67,6 @@ pub(super) fn add(
         body_adjoint::gather(frame, upstream, &of_body, gradient);
     }
     Ok(())
-}
-
-fn check(bound: &BoundAvatar, upstream: &PosedGradient) -> Result<(), SceneError> {
-    let n = bound.len();
-    expect_count("gradient of the posed means", upstream.means.len(), n)?;
-    expect_count("gradient of the factors", upstream.factors.len(), n)?;
-    expect_count("gradient of the opacities", upstream.opacities.len(), n)?;
-    expect_count("gradient of the posed SH", upstream.sh.len(), bound.sh.len())?;
-    match upstream.view_frames.len() {
-        0 => Ok(()),
-        found => expect_count("gradient of the view frames", found, n),
-    }
-}
-
-fn check_avatar(
-    bound: &BoundAvatar,
-    gaussians: &Gaussians,
-    gradient: &AvatarGradient,
-) -> Result<(), SceneError> {
-    bound.check_counts(gaussians)?;
-    let n = bound.len();
-    expect_count("f_dc/f_rest", gaussians.sh.len(), bound.sh.len())?;
-    expect_count("gradient of x, y, z", gradient.means.len(), n)?;
-    expect_count("gradient of rot", gradient.rotations.len(), n)?;
-    expect_count("gradient of scale", gradient.log_scales.len(), n)?;
-    expect_count("gradient of opacity", gradient.opacity_logits.len(), n)?;
-    expect_count("gradient of f_dc/f_rest", gradient.sh.len(), bound.sh.len())?;
-    let embedded = if bound.moves == Moves::WithFaces { n } else { 0 };
-    expect_count("gradient of barycentric", gradient.barycentric.len(), embedded)?;
-    expect_count("gradient of offset", gradient.offsets.len(), embedded)
-}
-
-fn check_body(frame: &Frame<'_>, gradient: &BodyGradient) -> Result<(), SceneError> {
-    let joints = frame.body.joints.len();
-    expect_count("gradient of the joints", gradient.linear.len(), joints)?;
-    expect_count("gradient of the joints' translations", gradient.translations.len(), joints)?;
-    expect_count("gradient of the joints' rotations", gradient.torques.len(), joints)
 }
 
 /// One chunk's part of an [`AvatarGradient`].
