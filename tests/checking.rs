@@ -125,6 +125,18 @@ fn every_damage_is_found_by_its_kind() {
     }
     let far = |c: &Camera| Camera { cx: 0.95 * f64::from(c.width), ..c.clone() };
     assert!(kinds(&with_cameras(&sequence, far)).contains(&Kind::Camera), "principal point at the edge");
+    for factor in [0.4, 1.6, 2.5] {
+        let zoomed = |c: &Camera| Camera { fx: c.fx * factor, fy: c.fy * factor, ..c.clone() };
+        assert_eq!(kinds(&with_cameras(&sequence, zoomed)), [Kind::Camera], "focal length {factor}");
+    }
+    let all_empty = checked(&with_masks(&sequence, |_, mask| empty(mask))).1;
+    assert!(all_empty[0].kind == Kind::EmptyMask && all_empty[0].spoils, "{all_empty:?}");
+    let whole = |mask: &Mask| Mask::filled(mask.width(), mask.height(), 1.0);
+    let meaningless = checked(&with_masks(&sequence, |_, mask| whole(mask))).1;
+    assert!(meaningless.iter().any(|finding| finding.spoils), "{meaningless:?}");
+    let still: Vec<Pose> = sequence.poses.iter().map(|_| Pose::rest(&sequence.body.skeleton)).collect();
+    let still = checked(&Sequence { poses: still.into(), ..sequence.clone() }).1;
+    assert!(still.iter().any(|finding| finding.spoils), "{still:?}");
     let away = |pose: &Pose| Pose { translation: pose.translation + DVec3::X * 50.0, ..pose.clone() };
     let poses: Vec<Pose> = sequence.poses.iter().map(away).collect();
     let gone = Sequence { poses: poses.into(), ..sequence.clone() };

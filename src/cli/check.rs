@@ -50,13 +50,10 @@ impl Check {
         for (name, subject) in self.data.subjects(self.name.as_deref())? {
             let subject = match subject {
                 Ok(subject) => subject,
-                Err(error) => match Finding::of_error(&error) {
-                    Some(finding) => {
-                        seen.findings.push(Finding { sequence: name, ..finding });
-                        continue;
-                    }
-                    None => return Err(error.into()),
-                },
+                Err(error) => {
+                    seen.findings.push(Finding { sequence: name, ..Finding::of_error(&error) });
+                    continue;
+                }
             };
             subject.notes.iter().for_each(|note| context.note(format!("{name}: {note}")));
             let own = check::subject(&subject).into_iter();

@@ -1,8 +1,8 @@
 //! What overlaps of silhouettes tell about the data.
 
-use super::{Finding, Kind, Seen, Shadows, lens};
+use super::{Finding, Kind, Seen, Shadows, lens, zoom};
 use glam::DVec2;
-use skinsplat_data::{FrameSource, Sequence, frames};
+use skinsplat_data::{FrameSource, MaskReading, Sequence, frames};
 use std::collections::BTreeMap;
 
 /// Everything that is wrong with a sequence.
@@ -17,12 +17,14 @@ pub(super) fn of(sequence: &Sequence, seen: &[Seen]) -> Vec<Finding> {
     found.extend(listed(
         Kind::EmptyMask,
         sequence,
+        seen.len(),
         &named(&|shadows| shadows.mask.area == 0),
         "no pixel of the mask",
     ));
     found.extend(listed(
         Kind::BodyOutOfView,
         sequence,
+        seen.len(),
         &named(&|shadows| shadows.body.area == 0),
         "the camera does not see the body",
     ));
@@ -34,6 +36,7 @@ pub(super) fn of(sequence: &Sequence, seen: &[Seen]) -> Vec<Finding> {
     let outside = mean(both.iter().filter_map(|(_, s)| s.body.overlap_with_outside(&s.mask)));
     if let (Some(plain), Some(outside)) = (plain, outside)
         && outside > plain + 0.2
+        && mean(both.iter().map(|(_, s)| s.mask.share_of_border())).is_some_and(|share| share > 0.5)
     {
         let detail =
             format!("the body overlaps what the masks leave out by {outside:.2}, the masks by {plain:.2}");
@@ -42,8 +45,12 @@ pub(super) fn of(sequence: &Sequence, seen: &[Seen]) -> Vec<Finding> {
     }
     let whole: Vec<Edges> = both.iter().filter_map(|(seen, shadows)| Edges::of(seen, shadows)).collect();
     let finding = moved(sequence, &whole).or_else(|| order(sequence, &both));
+    let finding = finding.or_else(|| zoom::far_off(sequence, &both));
     let finding = finding.or_else(|| lens::bent(sequence, &both));
     found.extend(finding.or_else(|| sized(sequence, &whole)));
+    if !found.iter().any(|finding| finding.spoils) {
+        found.extend(zoom::unexplained(sequence, &both));
+    }
     found
 }
 
@@ -71,10 +78,13 @@ fn unreadable(sequence: &Sequence, seen: &[Seen]) -> Vec<Finding> {
     by_kind.into_iter().map(finding).collect()
 }
 
-fn listed(kind: Kind, sequence: &Sequence, names: &[&str], what: &str) -> Option<Finding> {
+/// Frames of which something is true; of most of them, nothing can be made of the sequence.
+fn listed(kind: Kind, sequence: &Sequence, all: usize, names: &[&str], what: &str) -> Option<Finding> {
     let first = names.first()?;
-    let (some, all) = (names.len(), sequence.frames.len());
-    Some(Finding::new(kind, &sequence.id, format!("{what} in {some} of {all} frames, {first} first")))
+    let some = names.len();
+    let finding =
+        Finding::new(kind, &sequence.id, format!("{what} in {some} of {all} frames, {first} first"));
+    Some(Finding { spoils: finding.spoils || 2 * some > all, ..finding })
 }
 
 /// Masks in images of which no value reaches the half, or whose values are 0 and 1 of many.
@@ -82,7 +92,9 @@ fn dim_masks(sequence: &Sequence, seen: &[Seen]) -> Option<Finding> {
     let mut dim = Vec::new();
     for seen in seen {
         let FrameSource::Files(files) = &sequence.frames[seen.index].source else { continue };
-        let Some(mask) = &files.mask else { continue };
+        let Some(mask) = files.mask.as_ref().filter(|mask| mask.reading == MaskReading::Coverage) else {
+            continue;
+        };
         let Ok(Some(stored)) = frames::stored_range(&mask.path) else { continue };
         if stored.largest > 0.0 && stored.largest < 0.5 * stored.full {
             dim.push((&sequence.frames[seen.index].name, stored));
@@ -232,7 +244,7 @@ fn sized(sequence: &Sequence, whole: &[Edges]) -> Option<Finding> {
     let away = |of: fn(&Edges) -> [f64; 2]| {
         median(whole.iter().map(|e| e.residual(ratio, of(e))).collect()).unwrap_or(f64::INFINITY)
     };
-    let (camera, body) = (away(|e| e.principal), away(|e| e.root));
+    let (camera, body) = (away(|e| e.principal), away(|e| e.middle));
     let what = format!("the person is {ratio:.3} times as large as the body");
     Some(if camera < 0.7 * body {
         Finding::new(Kind::Camera, &sequence.id, format!("{what}, about the principal point: focal length"))
@@ -246,7 +258,7 @@ struct Edges {
     mask: [f64; 4],
     body: [f64; 4],
     principal: [f64; 2],
-    root: [f64; 2],
+    middle: [f64; 2],
     side: f64,
 }
 
@@ -260,7 +272,7 @@ impl Edges {
             mask: shadows.mask.bounds()?,
             body: shadows.body.bounds()?,
             principal: [camera.cx, camera.cy],
-            root: shadows.root?,
+            middle: shadows.middle?,
             side: f64::from(camera.width.max(camera.height)),
         })
     }

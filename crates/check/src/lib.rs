@@ -4,6 +4,7 @@ mod findings;
 mod lens;
 mod overlays;
 mod shadows;
+mod zoom;
 
 pub use overlays::write as write_overlays;
 
@@ -75,18 +76,20 @@ impl Finding {
         Self { kind, sequence: sequence.to_owned(), detail: detail.into(), spoils: kind.spoils() }
     }
 
-    /// The finding behind a subject that cannot be loaded, if there is a kind for it.
-    pub fn of_error(error: &Error) -> Option<Self> {
+    /// The finding behind a subject that cannot be loaded: no number can be made from it. What is not there, or is about
+    /// nothing in particular, is missing.
+    pub fn of_error(error: &Error) -> Self {
         let field = error.field();
         let is = |words: &[&str]| words.iter().any(|word| field.contains(word));
         let kind = match field {
-            _ if is(&["poses", "thetas", "body_pose", "global_orient"]) => Kind::PoseCount,
+            _ if matches!(error, Error::Read { .. }) => Kind::MissingFrames,
+            _ if is(&["poses", "thetas", "body_pose", "global_orient", "transl"]) => Kind::PoseCount,
             _ if is(&["betas", "shapedirs"]) => Kind::BetasSize,
-            _ if is(&["camera", "intrinsic", "extrinsic"]) => Kind::Camera,
-            _ if is(&["mask", "image", "frame", "file_path"]) => Kind::MissingFrames,
-            _ => return None,
+            _ if is(&["camera", "intrinsic", "extrinsic", "w2c"]) => Kind::Camera,
+            _ if is(&["gender", "model", "body", "weights", "v_template"]) => Kind::WrongGenderOrModel,
+            _ => Kind::MissingFrames,
         };
-        Some(Self::new(kind, "", error.to_string()))
+        Self { spoils: true, ..Self::new(kind, "", error.to_string()) }
     }
 }
 
@@ -122,8 +125,8 @@ struct Seen {
 struct Shadows {
     mask: Shadow,
     body: Shadow,
-    /// Where the body's root is seen, pixels.
-    root: Option<[f64; 2]>,
+    /// Where the body's middle is seen, pixels.
+    middle: Option<[f64; 2]>,
 }
 
 struct Problem {
@@ -173,11 +176,11 @@ fn shadows_of(small: &Sequence, index: usize, camera: &Camera) -> Result<Shadows
         Problem { kind: if labels { Kind::MaskRange } else { Kind::MissingFrames }, text }
     };
     let truth = small.truth(index).map_err(|error| unreadable(error.to_string()))?;
-    let (body, root) = project(small, index, camera).map_err(|error| unreadable(error.to_string()))?;
-    Ok(Shadows { mask: Shadow::of(&truth.alpha), body: Shadow::of(&body), root })
+    let (body, middle) = project(small, index, camera).map_err(|error| unreadable(error.to_string()))?;
+    Ok(Shadows { mask: Shadow::of(&truth.alpha), body: Shadow::of(&body), middle })
 }
 
-/// The silhouette of the posed body, and where its root is seen.
+/// The silhouette of the posed body, and where its middle is seen.
 fn project(
     sequence: &Sequence,
     index: usize,

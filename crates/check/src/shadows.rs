@@ -60,6 +60,15 @@ impl Shadow {
         bounds.map(|bounds| bounds.map(|edge| edge as f64))
     }
 
+    /// How much of the border of the image it covers.
+    pub(super) fn share_of_border(&self) -> f64 {
+        let (w, h) = (self.width, self.height);
+        let rows = (0..w).flat_map(|x| [(x, 0), (x, h - 1)]);
+        let columns = (0..h).flat_map(|y| [(0, y), (w - 1, y)]);
+        let covered = rows.chain(columns).filter(|&(x, y)| self.at(x, y)).count();
+        covered as f64 / (2 * (w + h)) as f64
+    }
+
     /// True if the shadow reaches the border of the image.
     pub(super) fn is_cut(&self) -> bool {
         let (right, bottom) = (self.width as f64, self.height as f64);
