@@ -1,7 +1,7 @@
 //! Skinning of Gaussian splats on the GPU: one WGSL source and what naga makes of it (HLSL, GLSL, MSL, SPIR-V).
 //!
 //! [`SKINNING`] is the source; `translations/` holds the other languages. [`layout`] says what its buffers hold and fills them,
-//! [`batch`] holds Gaussians and joints as plain data, [`reference`] computes in `f64` what the shader should answer.
+//! [`batch`] holds Gaussians and joints as plain data, [`mod@reference`] computes in `f64` what the shader should answer.
 //!
 //! Features: `translate` translates the source, `gpu` runs it through wgpu. Without them the crate builds on `skinsplat-core` alone.
 

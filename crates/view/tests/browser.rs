@@ -1,5 +1,6 @@
 //! The page in a browser: it poses as `f64` does, plays, turns, compares, and shows no complaint.
 #![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![allow(clippy::print_stdout, reason = "says how near pictures are")]
 
 #[path = "../../page/tests/support/chromium.rs"]
 mod chromium;
@@ -9,7 +10,11 @@ use glam::{DVec3, Vec3};
 use skinsplat_core::math::average::{Solver, average_rotation};
 use skinsplat_core::math::rotation::{self, angle_between};
 use skinsplat_core::math::{Quaternion, matrix3};
-use skinsplat_core::scene::{Avatar, Binding, Gaussians, Pose, PosedBody, RestBody, Skeleton, SkinWeights};
+use skinsplat_core::scene::{
+    Avatar, Binding, Camera, Gaussians, Pose, PosedBody, RestBody, Skeleton, SkinWeights,
+};
+use skinsplat_posing::{BoundAvatar, PoseOptions, Poser};
+use skinsplat_render::{View, splat};
 use skinsplat_view::{Motion, Page, ViewError};
 use std::path::Path;
 
@@ -175,6 +180,60 @@ fn every_choice_poses_as_f64_does() {
     assert_eq!(complaints(&browser), [""; 0]);
 }
 
+/// The picture as this project's renderer draws it, in 8 bits.
+fn rendered(strategy: &str, centre: DVec3, distance: f64, width: u32, height: u32) -> Vec<[u8; 3]> {
+    let (avatar, body) = (avatar(), body());
+    let posed_body = PosedBody::new(&body, &poses(&body)[8]).unwrap();
+    let back = DVec3::Z * 0.1_f64.cos() + DVec3::Y * 0.1_f64.sin();
+    let focal = f64::from(height) / 2.0 / (std::f64::consts::PI / 8.0).tan();
+    let camera = Camera::look_at(centre + distance * back, centre, DVec3::Y, focal, width, height);
+    let bound = BoundAvatar::new(&avatar, &body).unwrap();
+    let mut poser = Poser::new();
+    let posed = poser.pose(&bound, &posed_body, &strategy.parse().unwrap(), &PoseOptions::default()).unwrap();
+    let frame = splat::render(&posed, &View::new(&camera).over([0.0; 3])).unwrap();
+    frame.image.pixels().iter().map(|rgb| rgb.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)).collect()
+}
+
+/// Red, green and blue of the picture, row by row from the top, in hexadecimal digits.
+const PIXELS: &str = "(() => { const c = document.getElementById('canvas'); const d = document.createElement('canvas'); d.width = c.width; d.height = c.height; \
+     const x = d.getContext('2d'); x.drawImage(c, 0, 0); const p = x.getImageData(0, 0, c.width, c.height).data; const s = []; \
+     for (let i = 0; i < p.length; i += 4) s.push((65536 * p[i] + 256 * p[i + 1] + p[i + 2]).toString(16).padStart(6, '0')); return s.join(''); })()";
+
+#[test]
+fn pictures_are_those_of_the_renderer() {
+    let Some((_folder, mut browser)) = opened(700) else { return };
+    browser.click("#play", 0.5);
+    set(&mut browser, "frame", "8");
+    let number = |browser: &mut Chromium, script: &str| browser.value(script).as_f64().unwrap();
+    let meta = "JSON.parse(document.getElementById('meta').textContent)";
+    let centre = [0, 1, 2].map(|k| number(&mut browser, &format!("{meta}.centres[8][{k}]")));
+    let distance = 3.0 * number(&mut browser, &format!("{meta}.reach"));
+    let side = |browser: &mut Chromium, name: &str| {
+        number(browser, &format!("document.getElementById('canvas').{name}")) as u32
+    };
+    let (width, height) = (side(&mut browser, "width"), side(&mut browser, "height"));
+    for (choice, turned, strategy) in [
+        ("average", true, "quaternion-average"),
+        ("average", false, "quaternion-average+colour=none"),
+        ("aligned", true, "quaternion-average+rotation=nlerp"),
+        ("dual", true, "dual-quaternion"),
+        ("gram-schmidt", true, "quaternion-average+rotation=gram-schmidt-columns"),
+    ] {
+        set(&mut browser, "choice-a", &format!("'{choice}'"));
+        set(&mut browser, "turned-a", &turned.to_string());
+        let digits = browser.value(PIXELS);
+        let digits = digits.as_str().unwrap();
+        let level = |k: usize| u8::from_str_radix(&digits[2 * k..2 * k + 2], 16).unwrap();
+        let expected = rendered(strategy, DVec3::from_array(centre), distance, width, height);
+        assert_eq!(digits.len(), 6 * expected.len(), "{width} x {height}");
+        let off = |k: usize| f64::from(level(k)) - f64::from(expected[k / 3][k % 3]);
+        let squares: f64 = (0..3 * expected.len()).map(|k| off(k) * off(k)).sum();
+        let psnr = 10.0 * (255.0 * 255.0 * 3.0 * expected.len() as f64 / squares).log10();
+        println!("{strategy}: {psnr:.1} dB");
+        assert!(psnr > 60.0, "{strategy}: {psnr} dB");
+    }
+}
+
 /// Bytes of the picture, as a number that changes with it.
 const PICTURE: &str = "(() => { const c = document.getElementById('canvas'); let h = 0; for (const b of c.toDataURL()) h = (h * 31 + b.charCodeAt(0)) | 0; return h; })()";
 
@@ -199,11 +258,11 @@ fn a_person_can_play_turn_compare_and_mark() {
     let lit = browser.value(LIT).as_f64().unwrap();
     assert!((0.02..0.6).contains(&lit), "{lit} of the picture shows the arm");
 
-    let mut pictures = vec![browser.value(PICTURE)];
+    let mut last = browser.value(PICTURE);
     let mut differs = |browser: &mut Chromium, what: &str| {
         let picture = browser.value(PICTURE);
-        assert!(!pictures.contains(&picture), "{what} changes nothing");
-        pictures.push(picture);
+        assert_ne!(picture, last, "{what} changes nothing");
+        last = picture;
     };
     set(&mut browser, "turned-a", "false");
     differs(&mut browser, "SH not turned");
@@ -224,8 +283,11 @@ fn a_person_can_play_turn_compare_and_mark() {
     set(&mut browser, "mode", "'wipe'");
     differs(&mut browser, "the wipe");
     browser.focus("#canvas");
-    browser.press("]", 221);
-    browser.wait_for("Number(document.body.dataset.drawn) > window.seen + 1");
+    browser.value("window.seen = Number(document.body.dataset.drawn)");
+    // To a quarter, beyond the elbow.
+    (0..5).for_each(|_| browser.press("[", 219));
+    browser.wait_for("Number(document.body.dataset.drawn) > window.seen");
+    std::thread::sleep(std::time::Duration::from_millis(300));
     differs(&mut browser, "moving the wipe");
     set(&mut browser, "mode", "'difference'");
     differs(&mut browser, "the difference");

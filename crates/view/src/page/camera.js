@@ -16,7 +16,7 @@ class Camera {
     this.followed = meta.centres[0];
     this.shifted = [0, 0, 0];
     this.size = Math.max(meta.reach, 1e-3);
-    this.distance = 2.6 * this.size;
+    this.distance = 3 * this.size;
     this.turn = 0;
     this.tilt = 0.1;
     this.update();

@@ -30,3 +30,4 @@ const choices = [
   ["unaligned", "Sum, signs not aligned", 4],
   ["gram-schmidt", "Gram-Schmidt of the blended matrix", 5],
 ];
+const DUAL = 3;

@@ -43,6 +43,12 @@ void main() {
   drawn = vec4(min(10.0 * abs(texelFetch(a, place, 0).rgb - texelFetch(b, place, 0).rgb), vec3(1.0)), 1.0);
 }`;
 
+const COPY = `#version 300 es
+precision highp float;
+uniform sampler2D a;
+out vec4 drawn;
+void main() { drawn = vec4(texelFetch(a, ivec2(gl_FragCoord.xy), 0).rgb, 1.0); }`;
+
 // Poses all Gaussians: each call of `pose` fills one set of four textures.
 class Skinner {
   constructor(gl) {
@@ -139,6 +145,7 @@ class Drawer {
     this.gl = gl;
     this.program = compiled(gl, shaders.drawVertex, shaders.drawFragment);
     this.difference = compiled(gl, FULL_SCREEN, DIFFERENCE);
+    this.copy = compiled(gl, FULL_SCREEN, COPY);
     this.uniform = (name) => gl.getUniformLocation(this.program, name);
     this.array = gl.createVertexArray();
     gl.bindVertexArray(this.array);
@@ -162,7 +169,7 @@ class Drawer {
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, order);
   }
 
-  // Pictures that the difference is of, as large as the canvas.
+  // Pictures as large as the canvas, in more than 8 bits: a pixel is the sum of many small parts.
   picture(k, width, height) {
     const gl = this.gl;
     const old = this.pictures[k];
@@ -171,7 +178,7 @@ class Drawer {
       gl.deleteTexture(old.made);
       gl.deleteFramebuffer(old.frame);
     }
-    const made = texture(gl, gl.RGBA8, width, height, gl.RGBA, gl.UNSIGNED_BYTE, null);
+    const made = texture(gl, gl.RGBA16F, width, height, gl.RGBA, gl.HALF_FLOAT, null);
     const frame = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, made, 0);
@@ -215,16 +222,18 @@ class Drawer {
     gl.disable(gl.SCISSOR_TEST);
   }
 
-  drawDifference(a, b, width, height) {
+  // A picture, or the difference of two, on the canvas.
+  show(pictures, width, height) {
     const gl = this.gl;
+    const program = pictures.length > 1 ? this.difference : this.copy;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, width, height);
     gl.disable(gl.BLEND);
-    gl.useProgram(this.difference);
-    [a, b].forEach((picture, k) => {
+    gl.useProgram(program);
+    pictures.forEach((picture, k) => {
       gl.activeTexture(gl.TEXTURE0 + k);
       gl.bindTexture(gl.TEXTURE_2D, picture.made);
-      gl.uniform1i(gl.getUniformLocation(this.difference, k ? "b" : "a"), k);
+      gl.uniform1i(gl.getUniformLocation(program, k ? "b" : "a"), k);
     });
     gl.activeTexture(gl.TEXTURE0);
     gl.drawArrays(gl.TRIANGLES, 0, 3);

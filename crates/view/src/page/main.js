@@ -78,33 +78,36 @@ function start() {
     const both = mode !== "one";
     if (element("follow").checked) camera.follow(state.frame);
     skinner.useFrame(state.frame);
-    skinner.pose(targets[0], settings("a"));
-    if (both) skinner.pose(targets[1], settings("b"));
-    drawer.useOrder(order.sorted(state.frame, camera.direction));
+    const sides = both ? ["a", "b"] : ["a"];
+    const dual = sides.map((side) => settings(side).choice === DUAL);
+    sides.forEach((side, k) => skinner.pose(targets[k], settings(side)));
+    let sorted = null;
+    // Dual quaternions move means elsewhere, so they have an order of their own.
+    const drawn = (frame, k, area, only) => {
+      if (sorted !== dual[k]) drawer.useOrder(order.sorted(state.frame, camera.direction, dual[k]));
+      sorted = dual[k];
+      drawer.draw(frame, targets[k], camera, area, only, limit);
+    };
     const all = [0, 0, width, height];
     const half = Math.round(width / 2);
+    const pictures = (mode === "difference" ? [0, 1] : [0]).map((k) => drawer.picture(k, width, height));
+    pictures.forEach(({ frame }) => drawer.clear(frame, width, height, light));
+    const into = pictures[0].frame;
     if (mode === "difference") {
-      const pictures = [0, 1].map((k) => drawer.picture(k, width, height));
-      pictures.forEach((picture, k) => {
-        drawer.clear(picture.frame, width, height, light);
-        drawer.draw(picture.frame, targets[k], camera, all, all, limit);
+      pictures.forEach(({ frame }, k) => drawn(frame, k, all, all));
+    } else if (mode === "side") {
+      [0, 1].forEach((k) => {
+        const area = [k * half, 0, k ? width - half : half, height];
+        drawn(into, k, area, area);
       });
-      drawer.drawDifference(...pictures, width, height);
+    } else if (mode === "wipe") {
+      const at = Math.round(state.wipe * width);
+      drawn(into, 0, all, [0, 0, at, height]);
+      drawn(into, 1, all, [at, 0, width - at, height]);
     } else {
-      drawer.clear(null, width, height, light);
-      if (mode === "one") drawer.draw(null, targets[0], camera, all, all, limit);
-      if (mode === "side") {
-        [0, 1].forEach((k) => {
-          const area = [k * half, 0, k ? width - half : half, height];
-          drawer.draw(null, targets[k], camera, area, area, limit);
-        });
-      }
-      if (mode === "wipe") {
-        const at = Math.round(state.wipe * width);
-        drawer.draw(null, targets[0], camera, all, [0, 0, at, height], limit);
-        drawer.draw(null, targets[1], camera, all, [at, 0, width - at, height], limit);
-      }
+      drawn(into, 0, all, all);
     }
+    drawer.show(pictures, width, height);
     label("a", true);
     label("b", both);
     element("frame").value = state.frame;
@@ -164,7 +167,7 @@ function start() {
     }
     if (now - counted > 1000) {
       const rate = (1000 * drawn) / (now - counted);
-      status.textContent = `${meta.count.toLocaleString("en")} Gaussians, ${meta.joints} joints, ${meta.frames} frames; ${drawn ? `${rate.toFixed(0)} pictures per second` : "still"}`;
+      status.textContent = `${meta.count.toLocaleString("en")} Gaussians, ${meta.joints} joints, ${meta.frames} frames; ${drawn ? `${rate.toFixed(rate < 10 ? 1 : 0)} pictures per second` : "still"}`;
       drawn = 0;
       counted = now;
     }
