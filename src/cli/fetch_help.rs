@@ -5,6 +5,7 @@ use super::data::Data;
 use super::output::emit;
 use anyhow::Result;
 use skinsplat::datasets::Dataset;
+use skinsplat_data::layouts::LAYOUTS;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -24,8 +25,16 @@ const MODELS: [(&str, &str); 2] =
 impl FetchHelp {
     pub(super) fn run(&self) -> Result<Exit> {
         let registry = self.data.registry()?;
-        let dataset = registry.get(&self.dataset)?;
-        emit(&text(dataset)?)?;
+        // A layout beside that of a data set, such as peoplesnapshot-raw, is the same data in other files.
+        let of_layout = || {
+            let layout = LAYOUTS.iter().find(|layout| layout.id == self.dataset)?;
+            let dataset = registry.datasets.iter().find(|dataset| layout.id.starts_with(&dataset.id))?;
+            Some(Dataset { id: layout.id.to_owned(), layout: layout.id.to_owned(), ..dataset.clone() })
+        };
+        match (registry.get(&self.dataset), of_layout()) {
+            (Err(_), Some(dataset)) => emit(&text(&dataset)?)?,
+            (dataset, _) => emit(&text(dataset?)?)?,
+        }
         Ok(Exit::Success)
     }
 }

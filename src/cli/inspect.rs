@@ -2,6 +2,7 @@
 
 mod folder;
 mod needs;
+mod parts;
 
 use super::Exit;
 use super::output::emit;
@@ -19,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// Show what a file or folder holds, and what is wrong with it.
 ///
 /// Reads avatars (.ply, .npz, .pth, .ckpt, .glb with Gaussians, exports of SplattingAvatar), bodies (.npz, .pkl, .glb, .gltf), poses and cameras
-/// (.npz, .pkl, .json), images, results.json and the results store of a run; and folders: a subject in any of the layouts that
+/// (.npz, .pkl, .json), images, results.json and the results store of a run, parts of data sets (.npy, .tiff, .hdf5, .txt); and folders: a subject in any of the layouts that
 /// are read, folders of subjects, exports of SplattingAvatar, images that another program rendered.
 #[derive(Debug, clap::Args)]
 pub(super) struct Inspect {
@@ -47,10 +48,14 @@ impl Inspect {
             "npz" | "pkl" | "pickle" => arrays_text(path)?,
             "json" => json_text(path)?,
             "jsonl" => store_text(path)?,
-            "png" | "jpg" | "jpeg" | "npy" => image_text(&frames::load_image(path)?),
+            "png" | "jpg" | "jpeg" => image_text(&frames::load_image(path)?),
+            "npy" => parts::array_text(path)?,
+            "tiff" | "tif" => parts::depth_text(path)?,
+            "hdf5" | "h5" => parts::hdf5_text(path)?,
+            "txt" => parts::text_text(path)?,
             _ => {
-                let expected =
-                    ".ply, .pth, .ckpt, .npz, .pkl, .glb, .gltf, .json, .jsonl, .png, .jpg, .npy or a folder";
+                let expected = ".ply, .pth, .ckpt, .npz, .pkl, .glb, .gltf, .json, .jsonl, .png, .jpg, .npy, .tiff, .hdf5, .txt \
+                                or a folder";
                 bail!("{}: unknown kind of file; expected {expected}", path.display())
             }
         };

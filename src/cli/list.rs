@@ -68,7 +68,8 @@ impl List {
                 format!("not available: nothing reads the layout {} yet", d.layout)
             }
             (false, Some(_)) if d.is_begun() => {
-                format!("not complete: no folder {}", names(&d.missing_folders()))
+                let why = d.first_problem().map_or(String::new(), |why| format!("; {why}"));
+                format!("not complete: no folder {}{why}", names(&d.missing_folders()))
             }
             (false, Some(path)) => format!("not available: looked in {}", absolute(path).display()),
             (false, None) => "not available".to_owned(),

@@ -28,10 +28,15 @@ pub(super) struct Plan {
 
 impl Plan {
     pub(super) fn run(&self) -> Result<Exit> {
-        let Planned { plan, .. } = self.planning.plan()?;
+        let Planned { plan, library, .. } = self.planning.plan()?;
         match self.format {
             Format::Json => emit_json(&plan)?,
-            Format::Text => emit(&self.text(&plan)?)?,
+            Format::Text => {
+                let broken = library.unreadable().map(|(dataset, own)| {
+                    format!("cannot be loaded: {dataset}/{}: {}\n", own.subject, own.problem)
+                });
+                emit(&(self.text(&plan)? + &broken.collect::<String>()))?;
+            }
         }
         Ok(Exit::Success)
     }
@@ -39,12 +44,14 @@ impl Plan {
     fn text(&self, plan: &experiment::Plan) -> Result<String> {
         let mut text = format!("plan {}\n", plan.digest);
         for (index, table) in plan.tables.iter().enumerate() {
+            let without = table.rows.iter().filter(|row| row.missing.is_some()).count();
             let names: Vec<&str> = table.datasets.iter().map(|(_, title)| title.as_str()).collect();
             let frames = plan.jobs.iter().filter(|job| job.table == index).count();
             text += &format!(
-                "{}: {} sequences, {} variants, {frames} frames, protocol {}, on {}\n",
+                "{}: {} sequences{}, {} variants, {frames} frames, protocol {}, on {}\n",
                 table.experiment,
                 table.rows.len(),
+                if without > 0 { format!(" ({without} of them not there)") } else { String::new() },
                 table.variants.len(),
                 table.protocol,
                 if names.is_empty() { "no data".to_owned() } else { names.join(", ") },

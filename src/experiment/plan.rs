@@ -4,7 +4,7 @@ use super::avatar::{PlannedAvatar, Planner};
 use super::rows::{DataRow, Source, rows_of};
 use super::{
     CodeVersions, Dataset, Error, Experiment, Options, PoseNoise, SequenceInfo, Shard, Slices, SubjectInfo,
-    Variant, catalog,
+    Unreadable, Variant, catalog,
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::json;
@@ -219,6 +219,9 @@ impl Builder<'_> {
             .map(|d| (d.registered_id().to_owned(), d.title.clone()))
             .collect();
         let mut data_notes = self.data_notes(&rows);
+        if source != Source::Own {
+            data_notes.extend(self.why_not_own(experiment));
+        }
         if source == Source::Own
             && experiment.has_own_bodies()
             && rows.iter().all(|row| row.dataset == experiment.dataset)
@@ -236,6 +239,13 @@ impl Builder<'_> {
             variants: variants.iter().map(|(_, variant)| variant.id.clone()).collect(),
             protocol: protocol.key(),
         })
+    }
+
+    /// What keeps the subjects of an experiment's own data from being used, where some are there.
+    fn why_not_own(&self, experiment: &Experiment) -> Vec<String> {
+        let own = self.datasets.iter().find(|dataset| dataset.id == experiment.dataset);
+        let problem = |broken: &Unreadable| format!("not on {}: {}", experiment.dataset, broken.problem);
+        own.map_or_else(Vec::new, |own| own.unreadable.iter().map(problem).collect())
     }
 
     /// The notes of the subjects of some rows.
@@ -395,6 +405,11 @@ fn subset_names_something(
         [("subjects", &subset.subjects, subjects), ("variants", &subset.variants, variants)]
     {
         if let Some(stranger) = asked.iter().find(|id| !known.contains(id.as_str())) {
+            let broken = datasets.iter().flat_map(|d| &d.unreadable).find(|own| own.subject == *stranger);
+            if let (Some(broken), true) = (broken, key == "subjects") {
+                let problem = format!("`{stranger}` cannot be loaded: {}", broken.problem);
+                return Err(Error::invalid("subset", key, problem, "a subject that can be loaded"));
+            }
             let known: Vec<&str> = known.into_iter().collect();
             let expected = format!("one of {}", known.join(", "));
             return Err(Error::invalid("subset", key, format!("`{stranger}`"), expected));

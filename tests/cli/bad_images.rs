@@ -84,7 +84,7 @@ fn arrays_that_are_no_images() {
     write(&[4, 4, 2], vec![0.5; 32]);
     inspect(&["bad.npy", "[4, 4, 2]"], "two channels");
     write(&[48], vec![0.5; 48]);
-    inspect(&["bad.npy", "[48]"], "one dimension");
+    assert!(desk.ok(args!["inspect", "bad.npy"]).contains("[48]"), "an array of another kind");
     write(&[0, 4, 3], vec![]);
     inspect(&["bad.npy"], "no pixels");
     let mut values = vec![0.5; 48];

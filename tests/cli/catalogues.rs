@@ -53,13 +53,13 @@ fn inspect_tells_what_each_kind_of_file_holds() {
 #[test]
 fn inspect_refuses_what_it_does_not_know() {
     let desk = Desk::new();
-    desk.put("notes.txt", "x");
+    desk.put("notes.doc", "x");
     desk.put("other.json", "{}");
     desk.put("broken.json", "{");
     desk.put("frames.jsonl", "{\"frame\":1}\n");
     desk.put("empty/readme.txt", "x");
     for (path, parts) in [
-        ("notes.txt", vec!["notes.txt", "expected .ply"]),
+        ("notes.doc", vec!["notes.doc", "expected .ply"]),
         ("other.json", vec!["other.json"]),
         ("broken.json", vec!["broken.json", "line 1"]),
         ("frames.jsonl", vec!["frames.jsonl:1", "not a results store"]),

@@ -90,3 +90,38 @@ fn arrays_that_nothing_reads_are_named() {
     npz(&desk.path("body.npz"), &body);
     has(&desk.ok(args!["inspect", "body.npz"]), &["body model", "not read             vertex_colours"]);
 }
+
+#[test]
+fn parts_of_data_sets_are_listed() {
+    let desk = Desk::new();
+    let raw = data("small/layouts/peoplesnapshot-raw/ava");
+    has(&desk.ok(args!["inspect", raw.join("masks.hdf5")]), &["HDF5", "masks", "inspect FOLDER"]);
+    let ball = data("small/layouts/galabasketball/ball/model");
+    has(&desk.ok(args!["inspect", ball.join("weights.npy")]), &["array", "shape", "inspect FOLDER"]);
+    has(&desk.ok(args!["inspect", ball.join("mesh.txt")]), &["text", "lines", "inspect FOLDER"]);
+}
+
+/// A subject of which too little is there: `check` looks at the others, `plan` and a table that falls back say what is wrong with it, and
+/// asking for it alone is that error.
+#[test]
+fn a_subject_that_cannot_be_loaded_is_named_everywhere() {
+    let desk = Desk::new();
+    copy(&data("small/layouts/neuman/ava"), &desk.path("data/neuman/seattle"));
+    desk.put("sets.toml", include_str!("../../datasets.toml"));
+    let reason = "8 registered";
+    let asked = |words: &[&str]| {
+        words.iter().chain(&["--datasets", "sets.toml"]).map(std::ffi::OsString::from).collect::<Vec<_>>()
+    };
+    let looked = desk.run(asked(&["check", "neuman", "--format", "json"])).exits(1, "check");
+    has(&looked.out, &[reason, "missing-frames"]);
+    has(&desk.ok(asked(&["plan", "table1"])), &["cannot be loaded: neuman/seattle", reason]);
+    let alone = desk.run(asked(&["plan", "table1", "--subject", "seattle"]));
+    alone.refuses(&["seattle", reason], "the subject alone");
+    has(&desk.ok(asked(&["list", "datasets"])), &["no folder", "citron", reason]);
+}
+
+#[test]
+fn help_is_there_for_the_raw_layout_too() {
+    let text = Desk::new().ok(args!["fetch-help", "peoplesnapshot-raw"]);
+    has(&text, &["masks.hdf5", "layout = \"peoplesnapshot-raw\"", "graphics.tu-bs.de"]);
+}

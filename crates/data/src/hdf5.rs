@@ -44,6 +44,17 @@ impl Hdf5 {
         Ok(Self { path: path.to_owned(), file })
     }
 
+    /// Names of the arrays, those of groups of the first level included.
+    pub fn names(&self) -> Vec<String> {
+        let root = self.file.root();
+        let mut names = root.datasets().unwrap_or_default();
+        for group in root.groups().unwrap_or_default() {
+            let inner = self.file.group(&group).and_then(|inner| inner.datasets()).unwrap_or_default();
+            names.extend(inner.into_iter().map(|name| format!("{group}/{name}")));
+        }
+        names
+    }
+
     /// An array of numbers, at any depth ("group/name").
     ///
     /// # Errors

@@ -185,7 +185,10 @@ impl<'a> Models<'a> {
     pub(crate) fn path_of(&self, source: &Path, family: Family, gender: Gender) -> Result<PathBuf, Error> {
         let stems = family.file_stems(gender);
         let folders = match &self.options.model {
-            Some(model) if model.is_dir() => vec![model.clone()],
+            // A folder, or what would be one if it were there.
+            Some(model) if model.is_dir() || (model.extension().is_none() && !model.is_file()) => {
+                vec![model.clone()]
+            }
             Some(model) => return Ok(model.clone()),
             None => self.places(),
         };

@@ -93,6 +93,7 @@ pub(super) fn from_bytes(
 fn read_values(reader: impl Read, header: &Header, field: &str) -> Result<Array, SceneError> {
     let (big_endian, kind, size) = element(&header.descr, field)?;
     let convert: fn(&[u8]) -> f64 = match (kind, size) {
+        ('f', 2) => |b| f64::from(half::f16::from_le_bytes(sized(b))),
         ('f', 4) => |b| f64::from(f32::from_le_bytes(sized(b))),
         ('f', 8) => |b| f64::from_le_bytes(sized(b)),
         ('i', 1) => |b| f64::from(b[0] as i8),
@@ -218,7 +219,7 @@ fn element(descr: &str, field: &str) -> Result<(bool, char, usize), SceneError> 
 
 fn type_error(descr: &str, field: &str) -> SceneError {
     let hint = if descr.contains('O') { " (a pickled Python object)" } else { "" };
-    let expected = "32 or 64 bit floats, integers or booleans";
+    let expected = "16, 32 or 64 bit floats, integers or booleans";
     SceneError::new(field, format!("type {descr}{hint}"), expected)
 }
 

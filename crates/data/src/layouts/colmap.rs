@@ -59,10 +59,10 @@ pub(super) fn load(folder: &Path) -> Result<Vec<Registered>, Error> {
     Ok(images)
 }
 
-/// Ten words, the last of which is no number: points come in threes.
+/// Ten words or, where the name has spaces, more, and the last is no number as the last of a point is.
 fn is_image(line: &str) -> bool {
     let words: Vec<&str> = line.split_whitespace().collect();
-    words.len() == 10 && words[9].parse::<f64>().is_err()
+    words.len() >= 10 && words[words.len() - 1].parse::<f64>().is_err()
 }
 
 fn text(path: &Path, field: &str) -> Result<String, Error> {

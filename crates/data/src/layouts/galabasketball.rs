@@ -81,13 +81,16 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let train = part("train", &TRAIN_CAMERAS, request.split.map(|split| split.train))?;
     let test = part("test", &TEST_CAMERAS, request.split.map(|split| split.test))?;
     let note = "mesh.txt has no triangles: those of neighbouring vertices are the body's surface";
-    Ok(request.subject(Capture::Multiview, train, test, vec![note.to_owned()]))
+    let notes = std::iter::once(note.to_owned()).chain(rig.repaired).collect();
+    Ok(request.subject(Capture::Multiview, train, test, notes))
 }
 
 /// The body, and where its joints are relative to their parents.
 struct Rig {
     body: RestBody,
     positions: Vec<DVec3>,
+    /// What was done to its weights.
+    repaired: Option<String>,
 }
 
 impl Rig {
@@ -113,7 +116,7 @@ impl Rig {
             ));
         }
         let parents = parents(&folder.join("jointParent.txt"), joints)?;
-        let weights = weights(&folder.join("weights.npy"), vertices.len(), joints)?;
+        let (weights, repaired) = weights(&folder.join("weights.npy"), vertices.len(), joints)?;
         let bind = |j: usize| inverse_binds[j].inverse();
         let local = |(j, parent): (usize, &Option<usize>)| {
             let local = parent.map_or(bind(j), |p| inverse_binds[p] * bind(j));
@@ -126,7 +129,7 @@ impl Rig {
         let skeleton = Skeleton::new(names, parents, rest_locals, inverse_binds).map_err(scene)?;
         let body = RestBody { skeleton, vertices, faces, weights, uv: None, pose_directions: Vec::new() };
         body.validate().map_err(scene)?;
-        Ok(Self { body, positions })
+        Ok(Self { body, positions, repaired })
     }
 }
 
@@ -154,14 +157,17 @@ fn parents(path: &Path, joints: usize) -> Result<Vec<Option<usize>>, Error> {
     lines.iter().enumerate().map(parent).collect()
 }
 
-fn weights(path: &Path, vertices: usize, joints: usize) -> Result<SkinWeights, Error> {
+/// The weights, and what was done to those that did not sum to one.
+fn weights(path: &Path, vertices: usize, joints: usize) -> Result<(SkinWeights, Option<String>), Error> {
     let array = npy::read(path)?;
     if array.shape != [vertices, joints] {
         let expected = format!("({vertices}, {joints}): vertices of mesh.txt, joints of tpose.txt");
         return Err(Error::invalid(path, "weights", format!("shape {:?}", array.shape), expected));
     }
-    let rows = array.values.chunks_exact(joints).map(|row| row.iter().map(|&w| w as f32).enumerate());
-    SkinWeights::from_rows(rows, joints).map_err(|e| Error::scene(path, e))
+    let row = |row: &[f64]| row.iter().map(|&w| w as f32).enumerate().collect();
+    let mut rows: Vec<Vec<(usize, f32)>> = array.values.chunks_exact(joints).map(row).collect();
+    let repaired = SkinWeights::normalise(&mut rows).map(|what| format!("weights: {what}"));
+    Ok((SkinWeights::from_rows(rows, joints).map_err(|e| Error::scene(path, e))?, repaired))
 }
 
 /// Poses, and the place of each by its point in time.
@@ -247,7 +253,7 @@ impl Scene<'_> {
         for &camera in cameras {
             let background = self.background(id, camera)?;
             for &time in &times {
-                frames.push(self.frame(camera, time, &background)?);
+                frames.push(self.frame(camera, time, background.as_deref())?);
             }
         }
         frames.sort_by_key(|frame| (frame.time, frame.camera));
@@ -261,8 +267,8 @@ impl Scene<'_> {
         })
     }
 
-    /// The background of a camera that must be there.
-    fn background(&self, id: &str, camera: usize) -> Result<PathBuf, Error> {
+    /// What a camera, which must be there, sees without the player; none if nobody captured it.
+    fn background(&self, id: &str, camera: usize) -> Result<Option<PathBuf>, Error> {
         let file = self.folder.join(format!("camera/{camera}.txt"));
         if !file.is_file() {
             return Err(Error::invalid(
@@ -273,13 +279,10 @@ impl Scene<'_> {
             ));
         }
         let places = ["png", "jpg"].map(|end| self.folder.join(format!("bg/{camera}.{end}")));
-        places.into_iter().find(|path| path.is_file()).ok_or_else(|| {
-            let place = self.folder.join(format!("bg/{camera}.png"));
-            Error::invalid(place, "background", "missing", "what the camera sees without the player")
-        })
+        Ok(places.into_iter().find(|path| path.is_file()))
     }
 
-    fn frame(&self, camera: usize, time: usize, background: &Path) -> Result<FrameRef, Error> {
+    fn frame(&self, camera: usize, time: usize, background: Option<&Path>) -> Result<FrameRef, Error> {
         let image = self.images.get(&camera).and_then(|images| images.get(&time)).ok_or_else(|| {
             let folder = self.folder.join(camera.to_string());
             Error::invalid(folder, "images", format!("frame {time} is missing"), format!("{time:04}.png"))
@@ -289,12 +292,18 @@ impl Scene<'_> {
             Error::invalid(place, "poses", format!("none of frame {time}"), format!("{time:04}.txt"))
         })?;
         let own = image.with_file_name(format!("{}_mask.png", listing::stem(image)));
-        let mask = match own.is_file() {
-            true => MaskFile::from(own),
-            false => MaskFile { path: background.to_owned(), reading: MaskReading::Differs },
+        let mask = match background {
+            _ if own.is_file() => MaskFile::from(own),
+            Some(background) => MaskFile { path: background.to_owned(), reading: MaskReading::Differs },
+            None => {
+                let place = self.folder.join(format!("bg/{camera}.png"));
+                let expected =
+                    format!("what the camera sees without the player, or {}", listing::file_name(&own));
+                return Err(Error::invalid(place, "background", "missing", expected));
+            }
         };
         let files =
-            FrameFiles { image: image.clone(), mask: Some(mask), background: Some(background.to_owned()) };
+            FrameFiles { image: image.clone(), mask: Some(mask), background: background.map(Path::to_owned) };
         let name = format!("{camera}/{}", listing::stem(image));
         Ok(FrameRef { name, time, pose, camera, source: FrameSource::Files(files) })
     }

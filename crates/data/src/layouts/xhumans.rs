@@ -34,7 +34,7 @@ use crate::{
 };
 use glam::{DMat4, DVec3};
 use skinsplat_core::scene::{Camera, Image, Mask};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -83,7 +83,13 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
         Error::invalid(&gender_path, "gender", format!("\"{problem}\""), "female, male or neutral")
     })?;
     let betas = betas(&folder.join("mean_shape_smplx.npy"))?;
-    let mut person = Person { gender, betas, models: Models::new(folder, request.options), expressive: 0 };
+    let mut person = Person {
+        gender,
+        betas,
+        models: Models::new(folder, request.options),
+        expressive: 0,
+        absent: BTreeSet::new(),
+    };
     let mut part = |part: &str| -> Result<Vec<Sequence>, Error> {
         let place = folder.join(part);
         let takes = if place.is_dir() { listing::folders(&place, "takes")? } else { Vec::new() };
@@ -95,6 +101,7 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
         return Err(Error::invalid(folder, "takes", "none", "folders in train/ and test/"));
     }
     let mut notes = person.models.notes().to_vec();
+    notes.extend(person.absent.iter().map(|part| format!("{part}: not there, at rest")));
     if person.expressive > 0 {
         notes.push(format!("expressions are left out ({} frames have one)", person.expressive));
     }
@@ -118,6 +125,8 @@ struct Person<'a> {
     models: Models<'a>,
     /// Frames whose expression is not zero.
     expressive: usize,
+    /// Parts of the pose that files lack.
+    absent: BTreeSet<&'static str>,
 }
 
 impl Person<'_> {
@@ -146,17 +155,34 @@ impl Person<'_> {
     /// The pose of a frame.
     fn track(&mut self, path: &Path) -> Result<PoseTrack, Error> {
         let pickle = Pickle::read(path, "pose")?;
+        let root = pickle.root();
         let values = |name: &str, count: usize| {
-            let values = pickle.get(name)?.array()?.values;
+            let Some(found) = root.optional(name)? else { return Ok(None) };
+            let values = found.array()?.values;
             if values.len() != count || values.iter().any(|v| !v.is_finite()) {
                 let problem = format!("{} values", values.len());
                 return Err(Error::invalid(path, name, problem, format!("{count} finite numbers")));
             }
-            Ok(values)
+            Ok(Some(values))
         };
-        let parts = PARTS.iter().map(|&(name, part, count)| Ok((part, values(name, count)?)));
-        let parts = parts.collect::<Result<_, Error>>()?;
-        let translation = DVec3::from_slice(&values("transl", 3)?);
+        let mut parts = Vec::new();
+        for (name, part, count) in PARTS {
+            match values(name, count)? {
+                Some(values) => parts.push((part, values)),
+                // A part of the pose that is not there is at rest; a pose without a body is none.
+                None if matches!(part, Part::GlobalOrient | Part::BodyPose) => {
+                    pickle.get(name)?;
+                }
+                None => {
+                    self.absent.insert(name);
+                }
+            }
+        }
+        let translation = match values("transl", 3)? {
+            Some(values) => values,
+            None => values("trans", 3)?.map_or_else(|| pickle.get("transl").map(|_| Vec::new()), Ok)?,
+        };
+        let translation = DVec3::from_slice(&translation);
         if let Some(expression) = pickle.root().optional("expression")? {
             self.expressive += usize::from(expression.array()?.values.iter().any(|&v| v != 0.0));
         }

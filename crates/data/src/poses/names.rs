@@ -51,6 +51,12 @@ const DESCRIPTIONS: &[&str] = &[
     "model_type",
 ];
 
+/// Names of one thing each, of which the first that a file has is read.
+pub(super) fn synonyms() -> impl Iterator<Item = &'static [&'static str]> {
+    let parts = PARTS.iter().map(|(_, names)| *names).chain(PAIRS.iter().map(|(.., names)| *names));
+    [WHOLE, TRANSLATION, SCALE, BETAS, FRAMERATE].into_iter().chain(parts)
+}
+
 /// True for arrays that are read, repeat what is read, or only describe it.
 pub(super) fn is_known(name: &str) -> bool {
     [WHOLE, TRANSLATION, SCALE, BETAS, FRAMERATE, DESCRIPTIONS, &["expression"]].iter().any(|list| list.contains(&name))

@@ -44,6 +44,7 @@ pub(super) fn load(path: &Path) -> Result<PoseTrack, Error> {
     if !unread.is_empty() {
         notes.push(format!("not read: {}", unread.join(", ")));
     }
+    contradictions(&mut file, &mut notes)?;
     let framerate = first(&file, names::FRAMERATE)
         .and_then(|name| file.array(name).ok().flatten()?.values.first().copied());
     let gender =
@@ -57,6 +58,20 @@ pub(super) fn load(path: &Path) -> Result<PoseTrack, Error> {
         path: path.to_owned(),
         keys: Keys::Angles(angles),
     })
+}
+
+/// Says which arrays are passed over for another of the same meaning, where they hold other numbers.
+fn contradictions(file: &mut Arrays, notes: &mut Vec<String>) -> Result<(), Error> {
+    for names in names::synonyms() {
+        let there: Vec<&str> = names.iter().copied().filter(|name| file.contains(name)).collect();
+        let Some((read, others)) = there.split_first() else { continue };
+        for other in others {
+            if file.array(read)?.map(|array| array.values) != file.array(other)?.map(|array| array.values) {
+                notes.push(format!("{other}: not read, as {read} is there too and holds other numbers"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The first of several names that the file has.

@@ -19,6 +19,15 @@ fn header(descr: &str, fortran: bool, shape: &str) -> String {
 }
 
 #[test]
+fn half_floats_are_read_in_both_byte_orders() {
+    let folder = tempfile::tempdir().unwrap();
+    for (descr, bytes) in [("<f2", [0x00, 0x3c, 0x00, 0xc1]), (">f2", [0x3c, 0x00, 0xc1, 0x00])] {
+        let array = npy::read(&npy_file(folder.path(), &header(descr, false, "(2,)"), &bytes)).unwrap();
+        assert_eq!(array.values, [1.0, -2.5], "{descr}");
+    }
+}
+
+#[test]
 fn every_number_type_is_read_in_both_byte_orders() {
     let folder = tempfile::tempdir().unwrap();
     macro_rules! check {
@@ -78,7 +87,7 @@ fn broken_headers_and_absurd_shapes_are_refused_before_anything_is_allocated() {
         (header("<f4", false, "(3,)"), "truncated"),
         (header("<f4", false, "(-3,)"), "header"),
         (header("<f4", false, "3"), "header"),
-        (header("<f2", false, "(1,)"), "32 or 64 bit"),
+        (header("<f16", false, "(1,)"), "32 or 64 bit"),
         (header("<c8", false, "(1,)"), "32 or 64 bit"),
         (header("|O", false, "(1,)"), "pickled"),
         ("{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (1,), }".into(), "header"),

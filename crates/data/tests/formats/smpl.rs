@@ -283,6 +283,14 @@ fn translation_and_scale_by_any_name() {
     let (_, notes) =
         place(vec![("Rh", &[1, 3], Values::F32(vec![0.; 3])), ("fps", &[], Values::F32(vec![30.]))]);
     assert_eq!(notes, "not read: Rh");
+    let two = |other: f32| {
+        let trans = ("trans", &[1, 3][..], Values::F32(vec![0., 2., 5.]));
+        place(vec![trans, ("smpl_trans", &[1, 3], Values::F32(vec![0., 2., other]))]).1
+    };
+    assert_eq!(
+        [two(5.0), two(6.0)],
+        ["", "smpl_trans: not read, as trans is there too and holds other numbers"]
+    );
 }
 
 #[test]
