@@ -5,10 +5,13 @@ use skinsplat_core::scene::camera;
 use std::io::BufReader;
 use std::path::Path;
 use tiff::ColorType;
-use tiff::decoder::{Decoder, DecodingResult};
+use tiff::decoder::{Decoder, DecodingResult, Limits};
 
 /// No compressed image expands by more than this (deflate reaches 1032).
 const MAX_EXPANSION: u64 = 1100;
+
+/// What a strip may take beyond the picture, bytes.
+const STRIP: usize = 1 << 20;
 
 /// Depths of a picture, row by row, in the unit of the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +45,11 @@ pub fn load(path: &Path) -> Result<Depth, Error> {
         let problem = format!("{width}x{height} pixels in {length} bytes");
         return Err(Error::invalid(path, "depth size", problem, "a size that the file can hold"));
     }
+    // A strip may say that it is larger than the picture.
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = usize::try_from(size).unwrap_or(usize::MAX);
+    limits.intermediate_buffer_size = limits.decoding_buffer_size.saturating_add(STRIP);
+    let mut decoder = decoder.with_limits(limits);
     let values: Vec<f32> = match decoder.read_image().map_err(broken)? {
         DecodingResult::F32(values) => values,
         DecodingResult::F64(values) => values.into_iter().map(|v| v as f32).collect(),
