@@ -5,11 +5,12 @@ use super::page::PICTURES;
 use super::selection::name_and_path;
 use super::tolerances::ToleranceOptions;
 use super::{Context, Exit};
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::builder::{OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use skinsplat::report::compare::{self, Changes, Fate, Tolerances, Verdict};
 use skinsplat::report::{Results, picture_name};
 use skinsplat::run::pictures::single_picture;
+use skinsplat_data::error::read_text;
 use skinsplat_table::{FORMATS, to_json};
 use std::path::{Path, PathBuf};
 
@@ -160,8 +161,7 @@ impl Comparing {
     fn tolerances(&self) -> Result<Tolerances> {
         let asked = self.asked.0.clone();
         let Some(path) = &self.tolerances else { return Ok(Tolerances { asked, ..Tolerances::default() }) };
-        let text = skinsplat_data::source::read_to_string(path)
-            .with_context(|| format!("{}: cannot read", path.display()))?;
+        let text = read_text(path, "tolerances", "a TOML file of tolerances")?;
         let file = Tolerances::parse(&text).map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
         Ok(Tolerances { asked, ..file })
     }
@@ -213,7 +213,6 @@ pub(super) fn folder(run: &Path) -> &Path {
 /// A file that cannot be read or is none; the message names the file.
 pub(super) fn load(path: &Path) -> Result<Results> {
     let file = if path.is_dir() { path.join("results.json") } else { path.to_owned() };
-    let text = skinsplat_data::source::read_to_string(&file)
-        .with_context(|| format!("{}: cannot read", file.display()))?;
+    let text = read_text(&file, "results", "a run's folder, or its results.json")?;
     Results::from_json(&text).map_err(|problem| anyhow!("{}: {problem}", file.display()))
 }

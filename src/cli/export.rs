@@ -95,7 +95,7 @@ impl Export {
     }
 
     fn write_frames(&self, out: &Path, avatar: &Avatar, track: &Track<'_>, context: Context) -> Result<()> {
-        std::fs::create_dir_all(out).with_context(|| format!("{}: cannot make the folder", out.display()))?;
+        super::products::make_folder(out)?;
         let extension = if self.to == Kind::Glb { "glb" } else { "ply" };
         let mut written = |gaussians: &Gaussians, frame: usize| {
             self.write_posed(&out.join(format!("frame_{frame:04}.{extension}")), gaussians)

@@ -231,8 +231,7 @@ fn cameras_text(path: &Path) -> Result<String> {
 }
 
 fn json_text(path: &Path) -> Result<String> {
-    let text = skinsplat_data::source::read_to_string(path)
-        .with_context(|| format!("{}: cannot read", path.display()))?;
+    let text = skinsplat_data::error::read_text(path, "file", "a JSON document")?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let value: serde_json::Value =
         serde_json::from_str(text).with_context(|| format!("{}: not JSON", path.display()))?;

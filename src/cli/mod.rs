@@ -142,7 +142,7 @@ fn answered(error: &clap::Error) -> Exit {
     let text = error.render().to_string();
     let parts = text.split("\n\n").filter(|part| !part.starts_with("For more information"));
     let line = parts.map(one_line).collect::<Vec<_>>().join("; ");
-    report_error(line.trim_start_matches("error: "));
+    report_error(&line.trim_start_matches("error: ").replace(" is not in ", "; expected "));
     Exit::Unusable
 }
 

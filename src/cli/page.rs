@@ -9,6 +9,7 @@ use skinsplat::report::timing;
 use skinsplat::run::pictures::{INDEX, Index, Keep, Kept, Moving};
 use skinsplat::run::store;
 use skinsplat_data::atomic;
+use skinsplat_data::error::{read_bytes, read_text};
 use std::io::Write;
 use std::path::Path;
 
@@ -43,8 +44,7 @@ pub(super) const PICTURES: &str = "pictures";
 pub(super) fn page(results: &Results, folder: &Path, images: Images) -> Result<String> {
     let curves = folder.join("curves.csv");
     let curves = match curves.is_file() {
-        true => skinsplat_data::source::read_to_string(&curves)
-            .with_context(|| format!("{}: cannot read", curves.display()))?,
+        true => read_text(&curves, "curves", "the curves.csv of a run")?,
         false => String::new(),
     };
     let records = store::merge(store::stores(folder)?.iter().map(std::path::PathBuf::as_path))?;
@@ -78,8 +78,7 @@ fn kept(folder: &Path, images: Images) -> Result<KeptPictures> {
 fn still(folder: &Path, kept: &Kept) -> Result<Stills> {
     let read = |file: &String| -> Result<RgbImage> {
         let path = folder.join(file);
-        let bytes = skinsplat_data::source::read(&path)
-            .with_context(|| format!("{}: cannot read", path.display()))?;
+        let bytes = read_bytes(&path, "picture", "a PNG that the run kept")?;
         Ok(image::load_from_memory(&bytes)
             .with_context(|| format!("{}: cannot read the picture", path.display()))?
             .to_rgb8())
@@ -97,8 +96,7 @@ fn still(folder: &Path, kept: &Kept) -> Result<Stills> {
 
 fn moving(folder: &Path, of: &Moving) -> Result<MovingPicture> {
     let path = folder.join(&of.file);
-    let gif =
-        skinsplat_data::source::read(&path).with_context(|| format!("{}: cannot read", path.display()))?;
+    let gif = read_bytes(&path, "picture", "a GIF that the run kept")?;
     // Width and height are the first words after the signature.
     let word = |at: usize| gif.get(at..at + 2).map_or(1, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
     let size = [word(6), word(8)];

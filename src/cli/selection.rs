@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Reads a JSON file into a type; the error names the file and the place in it. A byte order mark is skipped.
 pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = skinsplat_data::source::read_to_string(path)
-        .with_context(|| format!("{}: cannot read", path.display()))?;
+    let text = skinsplat_data::error::read_text(path, "file", "a JSON document")?;
     let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
     serde_json::from_str(json).with_context(|| format!("{}: not the JSON that was expected", path.display()))
 }

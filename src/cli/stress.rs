@@ -1,9 +1,11 @@
 //! `reproduce stress`: numerical stability at the extremes.
 
 use super::output::emit;
+use super::products::make_folder;
 use super::progress::Watch;
 use super::{Context, Exit};
-use anyhow::{Context as _, Result};
+use anyhow::Result;
+use skinsplat_data::error::read_bytes;
 use skinsplat_data::{atomic, frames};
 use skinsplat_study::stress::{self, Report, Section};
 use std::io::Write;
@@ -43,7 +45,7 @@ impl std::str::FromStr for SectionName {
 impl Stress {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let out = &self.out;
-        std::fs::create_dir_all(out).with_context(|| format!("{}: cannot make the folder", out.display()))?;
+        make_folder(out)?;
         let sections: Vec<Section> = Section::ALL.into_iter().filter(|s| self.wants(*s)).collect();
         let watch = Watch::new(context.quiet);
         watch.start("sections", sections.len());
@@ -62,7 +64,7 @@ impl Stress {
         }
         let shown = report.pictures.iter().map(|picture| {
             let path = out.join(&picture.file);
-            skinsplat_data::source::read(&path).with_context(|| format!("{}: cannot read", path.display()))
+            Ok(read_bytes(&path, "picture", "the PNG that was just written")?)
         });
         let html = stress::page(&report, &shown.collect::<Result<Vec<_>>>()?).html();
         write(&out.join("stress.html"), &html)?;

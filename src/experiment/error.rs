@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum Error {
     /// The file or folder could not be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: cannot read: {source}; expected the TOML file of an experiment", path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,

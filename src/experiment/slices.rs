@@ -99,9 +99,22 @@ impl Slices {
     }
 }
 
+/// An avatar with the keys and costs of all its frames.
+struct Drawn<'a> {
+    avatar: &'a str,
+    making: Cost,
+    frames: Vec<(&'a str, Cost)>,
+}
+
+impl Drawn<'_> {
+    fn cost(&self) -> Cost {
+        self.making + self.frames.iter().map(|(_, cost)| cost).sum::<Cost>()
+    }
+}
+
 /// What is shared out, in the order of the plan.
 fn units(plan: &Plan, count: usize) -> Vec<Unit<'_>> {
-    let mut by_avatar: Vec<(&str, Cost, Vec<(&str, Cost)>)> = Vec::new();
+    let mut by_avatar: Vec<Drawn<'_>> = Vec::new();
     let mut places: BTreeMap<&str, usize> = BTreeMap::new();
     let mut known: BTreeSet<&str> = BTreeSet::new();
     let avatars: BTreeMap<&str, &PlannedAvatar> =
@@ -111,20 +124,20 @@ fn units(plan: &Plan, count: usize) -> Vec<Unit<'_>> {
         for variant in job.variants.iter().filter(|variant| known.insert(&variant.key)) {
             let place = *places.entry(&variant.avatar).or_insert_with(|| {
                 let making = avatars.get(variant.avatar.as_str()).map_or(0, |avatar| making(avatar, pixels));
-                by_avatar.push((&variant.avatar, making, Vec::new()));
+                by_avatar.push(Drawn { avatar: &variant.avatar, making, frames: Vec::new() });
                 by_avatar.len() - 1
             });
-            by_avatar[place].2.push((&variant.key, frame(variant, pixels)));
+            by_avatar[place].frames.push((&variant.key, frame(variant, pixels)));
         }
     }
-    let total: Cost =
-        by_avatar.iter().map(|(_, making, frames)| making + frames.iter().map(|f| f.1).sum::<Cost>()).sum();
+    let total: Cost = by_avatar.iter().map(Drawn::cost).sum();
     let least = total / (PIECES_PER_SHARD * count as Cost);
-    by_avatar.iter().flat_map(|(avatar, making, frames)| shared_out(avatar, *making, frames, least)).collect()
+    by_avatar.iter().flat_map(|drawn| shared_out(drawn, least)).collect()
 }
 
 /// The frames of an avatar in shares that cost at least `least` and as much as the avatar.
-fn shared_out<'a>(avatar: &'a str, making: Cost, frames: &[(&'a str, Cost)], least: Cost) -> Vec<Unit<'a>> {
+fn shared_out<'a>(drawn: &Drawn<'a>, least: Cost) -> Vec<Unit<'a>> {
+    let &Drawn { avatar, making, ref frames } = drawn;
     let enough = least.max(making).max(1);
     let mut units: Vec<Unit<'a>> = Vec::new();
     for &(key, cost) in frames {

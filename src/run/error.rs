@@ -27,7 +27,7 @@ pub enum Error {
     #[error(transparent)]
     Store(#[from] store::Error),
     /// A folder that cannot be made.
-    #[error("{}: cannot make the folder: {source}", path.display())]
+    #[error("{}: cannot make the folder: {source}; expected a place where folders can be made", path.display())]
     Folder {
         /// The folder.
         path: PathBuf,

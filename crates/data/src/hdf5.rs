@@ -184,13 +184,18 @@ impl Rows {
         };
         let total = product(&shape).ok_or_else(too_large)?;
         let layout = self.data.layout().map_err(|cause| self.broken(&cause))?;
+        // What a chunk says of itself is no more than the file has.
+        let length = std::fs::metadata(&self.path).map_or(0, |file| file.len());
         let Layout::Chunked { chunk_shape, .. } = layout else {
-            let stored = std::fs::metadata(&self.path).map_or(0, |file| file.len());
-            return if total <= stored { Ok(()) } else { Err(too_large()) };
+            return if total <= length { Ok(()) } else { Err(too_large()) };
         };
         let chunk = product(&chunk_shape).ok_or_else(too_large)?;
         let chunks = self.data.chunks().map_err(|cause| self.broken(&cause))?;
-        let stored = chunks.iter().fold(0u64, |sum, chunk| sum.saturating_add(chunk.storage_size));
+        if chunks.iter().any(|chunk| chunk.storage_size > length) {
+            return Err(too_large());
+        }
+        let stored =
+            chunks.iter().fold(0u64, |sum, chunk| sum.saturating_add(chunk.storage_size)).min(length);
         let smallest = chunks.iter().map(|chunk| chunk.storage_size).min().unwrap_or_default();
         let plausible = total / MAX_EXPANSION <= stored && chunk / MAX_EXPANSION <= smallest;
         if plausible { Ok(()) } else { Err(too_large()) }

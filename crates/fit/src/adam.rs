@@ -23,6 +23,11 @@ impl Adam {
         Self { options, steps: 0, first: vec![0.0; len], second: vec![0.0; len] }
     }
 
+    /// True if there are moments for so many parameters: what a checkpoint says of both may disagree.
+    pub(crate) fn is_for(&self, len: usize) -> bool {
+        self.first.len() == len && self.second.len() == len
+    }
+
     /// One step against the gradient.
     ///
     /// # Panics

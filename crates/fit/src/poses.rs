@@ -48,6 +48,11 @@ impl FreePose {
         Self { turns, shift: [0.0; 3], moments: Adam::new(3 * nodes + 3, moments), stopped: false }
     }
 
+    /// True if it is of a skeleton with so many nodes: a checkpoint may say something else.
+    pub(crate) fn is_for(&self, nodes: usize) -> bool {
+        self.turns.len() == nodes && self.moments.is_for(3 * nodes + 3)
+    }
+
     /// The pose as it stands.
     pub(crate) fn applied(&self, given: &Pose) -> Pose {
         let vectors: Vec<DVec3> =

@@ -37,16 +37,27 @@ fn broken(path: &Path, cause: impl std::fmt::Display) -> Error {
     Error::invalid(path, "image", cause.to_string(), IMAGE)
 }
 
-fn check_size(path: &Path, width: u32, height: u32) -> Result<(), Error> {
+/// Pixels of an image of whatever length.
+const PIXELS: u64 = 1 << 24;
+/// Pixels beyond those per byte of the file: photographs have less than twenty, drawings and masks are rarely so large.
+const PIXELS_PER_BYTE: u64 = 64;
+
+fn check_size(path: &Path, width: u32, height: u32, length: usize) -> Result<(), Error> {
     camera::check_image_size(width, height).map_err(|refused| {
         Error::invalid(path, "image", format!("{}: {}", refused.field, refused.problem), refused.expected)
-    })
+    })?;
+    if u64::from(width) * u64::from(height) > PIXELS + PIXELS_PER_BYTE * length as u64 {
+        let problem = format!("{width}x{height} pixels in {length} bytes");
+        let expected = format!("at most {PIXELS} pixels, and {PIXELS_PER_BYTE} more per byte of the file");
+        return Err(Error::invalid(path, "image size", problem, expected));
+    }
+    Ok(())
 }
 
 fn png(path: &Path, bytes: &[u8]) -> Result<Channels, Error> {
     let mut decoder = PngDecoder::new(Cursor::new(bytes)).map_err(|e| broken(path, e))?;
     let (width, height) = decoder.dimensions();
-    check_size(path, width, height)?;
+    check_size(path, width, height, bytes.len())?;
     let Stored { bits, samples } = Stored::of(bytes).ok_or_else(|| broken(path, "no header"))?;
     let row = (u64::from(width) * u64::from(bits) * u64::from(samples)).div_ceil(8) + 1;
     if row * u64::from(height) > (bytes.len() as u64).saturating_mul(MAX_EXPANSION) {
@@ -98,7 +109,7 @@ fn jpeg(path: &Path, bytes: &[u8]) -> Result<Channels, Error> {
     decoder.decode_headers().map_err(|e| broken(path, e))?;
     let (width, height) = decoder.dimensions().ok_or_else(|| broken(path, "no size"))?;
     let (width, height) = (width as u32, height as u32);
-    check_size(path, width, height)?;
+    check_size(path, width, height, bytes.len())?;
     let grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
     let colours = if grey { ColorSpace::Luma } else { ColorSpace::RGB };
     decoder.set_options(decoder.options().jpeg_set_out_colorspace(colours));

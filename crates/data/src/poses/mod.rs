@@ -54,6 +54,9 @@ enum Keys {
     Nodes { names: Vec<String>, poses: Vec<Pose>, source: SourceDigest },
 }
 
+/// Most poses of a file of angles: a small archive may hold many, all alike.
+const MAX_POSES: usize = 1 << 18;
+
 impl PoseTrack {
     /// A track of axis-angle values (radians) by part, frame after frame, with a translation (metres) per frame; either
     /// [`Part::Whole`] alone or other parts, each at most once. Principal coefficients of hands are told by their number
@@ -68,6 +71,10 @@ impl PoseTrack {
         translations: Vec<DVec3>,
     ) -> Result<Self, Error> {
         let frames = translations.len();
+        if frames > MAX_POSES {
+            let expected = format!("at most {MAX_POSES}, 36 minutes of 120 a second");
+            return Err(Error::invalid(path, "poses", format!("{frames} of them"), expected));
+        }
         let mut tracks: Vec<Track> = Vec::new();
         for (part, values) in parts {
             let width = values.len().checked_div(frames).unwrap_or(0);

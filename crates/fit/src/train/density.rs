@@ -26,6 +26,11 @@ impl Density {
         Self { sums: vec![0.0; n], counts: vec![0; n], first: n }
     }
 
+    /// True if it is of so many Gaussians: a checkpoint may say something else.
+    pub(super) fn is_for(&self, n: usize) -> bool {
+        self.sums.len() == n && self.counts.len() == n
+    }
+
     /// Takes note of an iteration.
     pub(super) fn observe(&mut self, gradient: &PosedGradient) {
         let seen = gradient.screen.iter().zip(&gradient.radii);

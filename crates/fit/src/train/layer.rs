@@ -49,6 +49,9 @@ impl Layer {
     pub(super) fn resume(sequence: &Sequence, recipe: &MeshLayer, state: State) -> Result<Self, Error> {
         let State { vertices, texels, moments } = state;
         let refuse = |error: SceneError| Error::Checkpoint { problem: error.to_string() };
+        if !moments.is_for(3 * texels.len()) {
+            return Err(Error::Checkpoint { problem: "it has not one moment per texel".to_owned() });
+        }
         let side = recipe.texture as usize;
         let texture = Texture::new(Image::new(side, side, texels).map_err(refuse)?);
         let vertices: Vec<DVec3> = vertices.into_iter().map(Vec3::as_dvec3).collect();

@@ -44,6 +44,11 @@ use skinsplat_render::mesh::Drawing;
 use skinsplat_render::splat::{Derivatives, Renderer};
 use std::sync::{Arc, OnceLock};
 
+/// A checkpoint that contradicts itself, whatever its checksum says.
+fn inconsistent(problem: &str) -> Error {
+    Error::Checkpoint { problem: format!("it has {problem}") }
+}
+
 /// What an iteration did.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Step {
@@ -218,8 +223,21 @@ impl<'a> Trainer<'a> {
         let Checkpoint { parameters, density, layer, poses, iteration, .. } = checkpoint.matching(&key)?;
         let layer = match (&options.recipe.mesh, layer) {
             (Some(mesh), Some(state)) => Some(Layer::resume(sequence, mesh, state)?),
-            _ => None,
+            (None, None) => None,
+            _ => return Err(inconsistent("the mesh of another recipe")),
         };
+        let (n, nodes) = (parameters.avatar.gaussians.len(), sequence.body.skeleton.len());
+        let refines = options.recipe.poses == Poses::Refine;
+        let problems = [
+            (!parameters.is_for(&options.recipe.free), "not one moment per parameter"),
+            (!density.is_for(n), "not one gradient per Gaussian"),
+            (poses.is_some() != refines, "the poses of another recipe"),
+            (poses.as_ref().is_some_and(|poses| !poses.are_for(nodes)), "poses of another skeleton"),
+            (iteration > options.iterations, "more iterations than the fit has"),
+        ];
+        if let Some((_, problem)) = problems.into_iter().find(|(is_wrong, _)| *is_wrong) {
+            return Err(inconsistent(problem));
+        }
         let trainer = Self::with_state(sequence, options, (parameters, density, layer, poses), iteration)?;
         Ok(Self { key: OnceLock::from(key), ..trainer })
     }

@@ -98,25 +98,29 @@ impl Origin {
 impl Parameters {
     /// Of an avatar before its first iteration; `edge` is the mean edge of the body's faces, metres.
     pub(super) fn new(avatar: Avatar, edge: f32, free: &Free, moments: Moments) -> Self {
+        let adam = |len: usize| Adam::new(len, moments);
+        let [position, height, rotation, scale, opacity, colour] = Self::lengths(&avatar, free).map(adam);
+        Self { start: Origin::of(&avatar), edge, position, height, rotation, scale, opacity, colour, avatar }
+    }
+
+    /// Numbers of free parameters: positions, heights over faces, rotations, scales, opacities, colours.
+    fn lengths(avatar: &Avatar, free: &Free) -> [usize; 6] {
         let n = avatar.gaussians.len();
         let along = free.position == FreePosition::AlongNormal;
-        let adam = |len: usize| Adam::new(len, moments);
         let (position, height) = match &avatar.binding {
             Binding::Face(_) => (if along { 0 } else { 3 * n }, n),
             Binding::Static | Binding::Vertex(_) => (if along { n } else { 3 * n }, 0),
         };
         let rotation = if free.rotation == FreeRotation::AboutNormal { n } else { 4 * n };
-        Self {
-            start: Origin::of(&avatar),
-            edge,
-            position: adam(position),
-            height: adam(height),
-            rotation: adam(rotation),
-            scale: adam(3 * n),
-            opacity: adam(n),
-            colour: adam(3 * avatar.gaussians.sh.len()),
-            avatar,
-        }
+        [position, height, rotation, 3 * n, n, 3 * avatar.gaussians.sh.len()]
+    }
+
+    /// True if what belongs together has one length: a checkpoint may say something else.
+    pub(super) fn is_for(&self, free: &Free) -> bool {
+        let moments =
+            [&self.position, &self.height, &self.rotation, &self.scale, &self.opacity, &self.colour];
+        let lengths = Self::lengths(&self.avatar, free);
+        self.start.len() == self.len() && moments.into_iter().zip(lengths).all(|(adam, len)| adam.is_for(len))
     }
 
     /// Number of Gaussians.

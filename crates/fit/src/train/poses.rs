@@ -26,6 +26,11 @@ pub struct RefinedPose {
 }
 
 impl TrainingPoses {
+    /// True if every pose is of a skeleton with so many nodes.
+    pub(super) fn are_for(&self, nodes: usize) -> bool {
+        self.0.values().all(|free| free.is_for(nodes))
+    }
+
     /// A pose as it stands.
     pub(super) fn applied(&self, index: usize, given: &Pose) -> Pose {
         self.0.get(&index).map_or_else(|| given.clone(), |free| free.applied(given))
