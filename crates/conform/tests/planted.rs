@@ -245,6 +245,15 @@ fn another_convention_and_its_orders() {
             let error = check(folder.path(), &path, &options).unwrap_err().to_string();
             assert!(error.contains("convention") && error.contains("as declared"), "{error}");
         }
+        // PLYs are in one convention, whatever that of the vectors.
+        for file in ["expected", "expected/pose_0003.ply"] {
+            let report = check(folder.path(), &folder.path().join(file), &Options::default()).unwrap();
+            assert_eq!(report.verdict, Verdict::Conforms, "{name} {file}: {}", report.text());
+            let options = Options { convention: Some(convention), ..Options::default() };
+            let declared = check(folder.path(), &folder.path().join(file), &options);
+            let same = convention.map == Convention::default().map;
+            assert_eq!(declared.is_ok(), same, "{name} {file}");
+        }
         // Numbers that say nothing of their convention, declared as what they are not.
         let bare = folder.path().join("bare.json");
         std::fs::write(&bare, json_of(&skin(&bench().inputs, &[]), &FIELDS)).unwrap();
