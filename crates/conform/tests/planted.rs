@@ -312,6 +312,50 @@ fn bad_answers_are_one_line() {
     }
 }
 
+/// As many numbers in another order, of other extents or of no covariance.
+#[test]
+fn arrays_of_another_shape_are_refused() {
+    let outs = skin(&bench().inputs, &[]);
+    let (poses, gaussians) = (outs.len(), outs[0].len());
+    let mean = |pose: usize, i: usize| serde_json::json!(outs[pose][i].mean);
+    let nested = |outer: usize, inner: usize, at: &dyn Fn(usize, usize) -> serde_json::Value| {
+        (0..outer).map(|a| (0..inner).map(|b| at(a, b)).collect()).collect::<Vec<Vec<_>>>()
+    };
+    let full = |upper: [f64; 6]| {
+        let [xx, xy, xz, yy, yz, zz] = upper;
+        serde_json::json!([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    };
+    let right = serde_json::json!({
+        "means": nested(poses, gaussians, &mean).concat().iter().flat_map(|v| v.as_array().unwrap().clone()).collect::<Vec<_>>(),
+        "covariances": nested(poses, gaussians, &|pose, i| full(outs[pose][i].covariance)),
+        "opacities": nested(poses, gaussians, &|pose, i| serde_json::json!([outs[pose][i].opacity])),
+    });
+    assert_eq!(of_text(right.to_string()).unwrap().verdict, Verdict::Conforms);
+    let alone =
+        serde_json::json!({ "frame": 2, "means": outs[2].iter().map(|o| o.mean).collect::<Vec<_>>() });
+    assert_eq!(of_text(alone.to_string()).unwrap().verdict, Verdict::Conforms);
+    let turned = serde_json::json!({ "means": nested(gaussians, poses, &|i, pose| mean(pose, i)) });
+    let mut ragged = serde_json::json!({ "means": nested(poses, gaussians, &mean) });
+    let moved = ragged["means"][1][3].as_array_mut().unwrap().pop().unwrap();
+    ragged["means"][1][4].as_array_mut().unwrap().push(moved);
+    let mut one_sided = right.clone();
+    one_sided["covariances"][1][3][0][2] = serde_json::json!(0.5);
+    for (what, answer, parts) in [
+        ("Gaussian by Gaussian", turned, ["means", "54 x 6 x 3", "6 x 54 x 3"]),
+        ("ragged", ragged, ["means[1][3]", "a list of 2", "a list of 3"]),
+        ("one-sided", one_sided, ["covariances[1][3]", "0.5", "symmetric"]),
+    ] {
+        let error = of_text(answer.to_string()).map(|report| report.text()).unwrap_err().to_string();
+        assert!(parts.iter().all(|part| error.contains(part)) && !error.contains('\n'), "{what}: {error}");
+    }
+    // Flat binary says its extents too: the first block is means.
+    let mut bytes = binary(&outs, "");
+    bytes[40 + 32..40 + 36].copy_from_slice(&(gaussians as u32).to_le_bytes());
+    bytes[40 + 36..40 + 40].copy_from_slice(&(poses as u32).to_le_bytes());
+    let error = of_text(bytes).map(|report| report.text()).unwrap_err().to_string();
+    assert!(error.contains("54 x 6 x 3"), "{error}");
+}
+
 #[test]
 fn folders_that_hold_no_rig_are_refused() {
     let folder = tempfile::tempdir().unwrap();
