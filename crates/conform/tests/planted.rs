@@ -312,6 +312,25 @@ fn bad_answers_are_one_line() {
     }
 }
 
+/// Another order is seen where means are wrong too, by what no pose changes; and is not seen where there is none.
+#[test]
+fn another_order_is_seen_beside_other_bugs() {
+    for bug in ["row-major-matrices", "bind-pose-missing", "one-frame-late", "scale-ball"] {
+        let mut outs = skin(&bench().inputs, &[bug, "bind-pose-missing"]);
+        outs.iter_mut().for_each(|pose| pose.reverse());
+        for answer in [json_of(&outs, &FIELDS), json_of(&outs, &["means", "quaternions", "sh"])] {
+            let error = of_text(answer).map(|report| report.text()).unwrap_err().to_string();
+            assert!(error.contains("place 0 holds Gaussian 53, and 54 of 54"), "{bug}: {error}");
+        }
+    }
+    // Opacities of two Gaussians swapped: everything else says that the order is right.
+    let mut outs = skin(&bench().inputs, &["bind-pose-missing"]);
+    for pose in &mut outs {
+        (pose[3].opacity, pose[20].opacity) = (pose[20].opacity, pose[3].opacity);
+    }
+    expect(&of_json(&outs), &["bind-pose-missing", "unknown"], "swapped opacities");
+}
+
 /// As many numbers in another order, of other extents or of no covariance.
 #[test]
 fn arrays_of_another_shape_are_refused() {
