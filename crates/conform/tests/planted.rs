@@ -144,6 +144,14 @@ fn single_bugs_are_named_in_ply() {
     expect(&of_ply(&right, &["scale", "opacity"]), &["activated-opacity", "activated-scale"], "both");
 }
 
+/// Only directions tell.
+#[test]
+fn reversed_directions_are_named() {
+    let report = of_json(&skin(&bench().inputs, &["direction-reversed"]));
+    expect(&report, &["direction-reversed"], "from the Gaussian to the camera");
+    assert_eq!(report.explanations[0]["fields"], serde_json::json!(["directions"]));
+}
+
 #[test]
 fn what_is_known_of_a_bug_is_said() {
     let detail = |bug: &str, key: &str| {
@@ -162,7 +170,7 @@ fn what_is_known_of_a_bug_is_said() {
 }
 
 /// Two bugs at once, and both names.
-const PAIRS: [([&str; 2], &[&str]); 14] = [
+const PAIRS: [([&str; 2], &[&str]); 15] = [
     (["xyzw-for-wxyz", "sh-not-turned"], &["sh-not-turned", "xyzw-for-wxyz"]),
     (["signs-not-aligned", "sh-not-turned"], &["sh-not-turned", "signs-not-aligned"]),
     (["dual-quaternions", "weights-cut-to-four"], &["dual-quaternions", "weights-cut-to-four"]),
@@ -179,6 +187,7 @@ const PAIRS: [([&str; 2], &[&str]); 14] = [
         &["weights-cut-to-four", "weights-not-normalised", "xyzw-for-wxyz"],
     ),
     (["not-normalised", "weights-quantised"], &["not-normalised", "weights-quantised"]),
+    (["direction-reversed", "sh-not-turned"], &["direction-reversed", "sh-not-turned"]),
     (["sh-basis-sign-out", "signs-not-aligned"], &["sh-basis-sign", "signs-not-aligned"]),
 ];
 
