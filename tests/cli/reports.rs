@@ -69,6 +69,34 @@ fn a_worse_result_is_exit_code_1() {
     compare("other.json", &[]).exits(3, "nothing in common");
 }
 
+/// `report --baseline` says what `compare` says, of the tables that were asked for and in the format that was asked for.
+#[test]
+fn a_baseline_is_reported_as_compare_does() {
+    let desk = finished();
+    let mut two: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
+    let mut other = two["tables"][0].clone();
+    other["experiment"] = Value::from("other");
+    two["tables"].as_array_mut().unwrap().push(other);
+    desk.put("two.json", two.to_string());
+    let one = desk.run(args!["report", "two.json", "--baseline", "two.json", "--table", "tiny"]);
+    let one = one.exits(0, "one table of two").out;
+    assert!(one.contains("unchanged") && !one.contains("other"), "{one}");
+    desk.run(args!["report", "two.json", "--baseline", "two.json", "--table", "third"])
+        .refuses(&["third", "other, tiny"], "no such table");
+    for format in ["text", "markdown", "csv", "latex", "json"] {
+        let report =
+            desk.ok(args!["report", "run", "--baseline", "two.json", "--table", "tiny", "--format", format]);
+        let compare = desk.ok(args!["compare", "two.json", "run", "--table", "tiny", "--format", format]);
+        assert_eq!(report, compare, "{format}");
+    }
+    desk.run(args!["report", "run", "--baseline", "run", "--format", "html"])
+        .refuses(&["--format html", "--baseline"], "no page of what moved");
+    desk.run(args!["report", "run", "--timing", "--format", "html", "--out", "t.html"])
+        .refuses(&["--format html", "--timing"], "no page of times");
+    desk.run(args!["report", "two.json", "--timing"])
+        .refuses(&["frames.jsonl", "no recorded times"], "no times");
+}
+
 #[test]
 fn an_incomplete_run_is_exit_code_3() {
     let desk = Desk::new();
