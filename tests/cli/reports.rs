@@ -109,6 +109,12 @@ fn an_incomplete_run_is_exit_code_3() {
     assert!(desk.read("run/tables.md").contains("no subject \\`nobody\\`"));
 }
 
+/// The first item of a list again at its end.
+fn twice(items: &mut Value) {
+    let first = items[0].clone();
+    items.as_array_mut().unwrap().push(first);
+}
+
 #[test]
 fn what_is_no_result_is_named() {
     let desk = finished();
@@ -120,16 +126,38 @@ fn what_is_no_result_is_named() {
     };
     for (content, parts) in [
         (String::new(), vec!["bad.json"]),
-        ("[]".to_owned(), vec!["bad.json"]),
+        ("[]".to_owned(), vec!["bad.json", "a list; expected an object", "SCHEMA.md"]),
         (changed(|r| r["schema"] = Value::from(99)), vec!["bad.json", "schema", "99"]),
-        (changed(|r| r["tables"] = Value::from("none")), vec!["bad.json", "expected a sequence"]),
+        (
+            changed(|r| r["tables"] = Value::from("none")),
+            vec!["bad.json", "tables: text \"none\"; expected a list"],
+        ),
         (changed(|r| r["extra"] = Value::from(1)), vec!["bad.json", "extra"]),
         (
             changed(|r| {
                 r["tables"][0]["sequences"][0]["variants"][0]["summary"]["values"]["psnr"] =
                     Value::from("high")
             }),
-            vec!["bad.json"],
+            vec![
+                "bad.json: tables[0].sequences[0].variants[0].summary.values.psnr: text \"high\"; expected a number",
+                "SCHEMA.md",
+            ],
+        ),
+        (
+            changed(|r| {
+                r["tables"][0]["sequences"][0]["variants"][1]["frames"][0]["score"]["values"]["ssim"] =
+                    Value::Null
+            }),
+            vec!["bad.json: tables[0].sequences[0].variants[1].frames[0].score: `ssim` is null", "a number"],
+        ),
+        (changed(|r| twice(&mut r["tables"])), vec!["tables: experiment: `tiny` twice"]),
+        (
+            changed(|r| twice(&mut r["tables"][0]["sequences"])),
+            vec!["sequences: id", "twice; expected each once"],
+        ),
+        (
+            changed(|r| twice(&mut r["tables"][0]["sequences"][0]["variants"])),
+            vec!["variants: id", "twice; expected each once"],
         ),
         (desk.read("run/results.json")[..400].to_owned(), vec!["bad.json", "line"]),
     ] {
