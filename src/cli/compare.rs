@@ -12,6 +12,7 @@ use skinsplat::report::{Results, picture_name};
 use skinsplat::run::pictures::single_picture;
 use skinsplat_data::error::read_text;
 use skinsplat_table::{FORMATS, to_json};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Compare a run with an earlier one: what regressed, improved, is missing or new.
@@ -106,8 +107,8 @@ impl Compare {
             ([run], true) => compare::against_paper(&self.chosen(load(run)?)?),
             ([baseline, current], false) => {
                 let both = [load(baseline)?, load(current)?];
-                self.check_tables(&both)?;
-                let [before, after] = both.map(|results| self.only(results));
+                check_tables(&self.tables, &both)?;
+                let [before, after] = both.map(|results| only(&self.tables, results));
                 let mut changes = self.how.compare(&before, &after)?;
                 add_pictures(&mut changes, [baseline, current]);
                 changes
@@ -123,29 +124,31 @@ impl Compare {
         self.how.print(&changes, &self.format, context)
     }
 
-    /// Refuses a table that neither run has.
-    fn check_tables(&self, runs: &[Results]) -> Result<()> {
-        let known: Vec<&str> = runs.iter().flat_map(|r| &r.tables).map(|t| t.experiment.as_str()).collect();
-        match self.tables.iter().find(|id| !known.contains(&id.as_str())) {
-            Some(id) => {
-                let known: std::collections::BTreeSet<&str> = known.into_iter().collect();
-                let known: Vec<&str> = known.into_iter().collect();
-                bail!("--table {id}; expected one of {}", known.join(", "))
-            }
-            None => Ok(()),
-        }
-    }
-
     fn chosen(&self, results: Results) -> Result<Results> {
-        self.check_tables(std::slice::from_ref(&results))?;
-        Ok(self.only(results))
+        check_tables(&self.tables, std::slice::from_ref(&results))?;
+        Ok(only(&self.tables, results))
     }
+}
 
-    /// The tables that were asked for.
-    fn only(&self, mut results: Results) -> Results {
-        results.tables.retain(|table| self.tables.is_empty() || self.tables.contains(&table.experiment));
-        results
+/// Refuses a table that none of the runs has.
+///
+/// # Errors
+/// The first such table, with those that there are.
+pub(super) fn check_tables(tables: &[String], runs: &[Results]) -> Result<()> {
+    let known: BTreeSet<&str> = runs.iter().flat_map(|r| &r.tables).map(|t| t.experiment.as_str()).collect();
+    match tables.iter().find(|id| !known.contains(id.as_str())) {
+        Some(id) => {
+            let known: Vec<&str> = known.into_iter().collect();
+            bail!("--table {id}; expected one of {}", known.join(", "))
+        }
+        None => Ok(()),
     }
+}
+
+/// The tables that were asked for; all if none was.
+pub(super) fn only(tables: &[String], mut results: Results) -> Results {
+    results.tables.retain(|table| tables.is_empty() || tables.contains(&table.experiment));
+    results
 }
 
 impl Comparing {

@@ -65,7 +65,7 @@ struct Check {
     /// The engine's answer: a posed PLY or a folder with one per pose, JSON, or flat binary (see the README in DIR)
     #[arg(value_name = "ENGINE_OUTPUT")]
     answer: PathBuf,
-    /// The convention of the answer [default: that of DIR]
+    /// The convention of the answer [default: that of the vectors in DIR; of PLYs skinsplat]
     #[arg(long, value_name = "C")]
     convention: Option<Convention>,
     /// Which pose a single PLY is, counted from 0 [default: the number in its name, else the one that fits]

@@ -74,6 +74,7 @@ impl Export {
             return Ok(Exit::Success);
         }
         let Some(out) = &self.out else { bail!("--out: missing; expected a file to write") };
+        self.check_out(out)?;
         if !self.posing.has_body() {
             bail!("--body is missing: an avatar is posed by a body");
         }
@@ -94,9 +95,29 @@ impl Export {
         Ok(Exit::Success)
     }
 
+    /// Refuses what the kind of file does not allow: frame by frame, or under another ending.
+    fn check_out(&self, out: &Path) -> Result<()> {
+        if self.all_frames && self.to == Kind::SkinnedGlb {
+            bail!(
+                "--all-frames with --to skinned-glb; expected one of the two: its clip holds every pose of the track"
+            );
+        }
+        let expected = self.extension();
+        match out.extension() {
+            Some(found) if !self.all_frames && !found.eq_ignore_ascii_case(expected) => {
+                bail!("--out {}; expected a file whose name ends in .{expected}", out.display())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn extension(&self) -> &'static str {
+        if self.to == Kind::PosedPly { "ply" } else { "glb" }
+    }
+
     fn write_frames(&self, out: &Path, avatar: &Avatar, track: &Track<'_>, context: Context) -> Result<()> {
         super::products::make_folder(out)?;
-        let extension = if self.to == Kind::Glb { "glb" } else { "ply" };
+        let extension = self.extension();
         let mut written = |gaussians: &Gaussians, frame: usize| {
             self.write_posed(&out.join(format!("frame_{frame:04}.{extension}")), gaussians)
         };

@@ -4,12 +4,12 @@ use super::Context;
 use anyhow::{Context as _, Result};
 use image::RgbImage;
 use skinsplat::report::Results;
-use skinsplat::report::html::{BOUND, Extras, KeptPictures, MovingPicture, Stills, html};
+use skinsplat::report::html::{BOUND, Extras, KeptPictures, MovingPicture, Stills, frames_that_fit, html};
 use skinsplat::report::timing;
 use skinsplat::run::pictures::{INDEX, Index, Keep, Kept, Moving};
 use skinsplat::run::store;
-use skinsplat_data::atomic;
 use skinsplat_data::error::{read_bytes, read_text};
+use skinsplat_data::{atomic, select::evenly_spaced};
 use std::io::Write;
 use std::path::Path;
 
@@ -49,9 +49,25 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images) -> Result<S
     };
     let records = store::merge(store::stores(folder)?.iter().map(std::path::PathBuf::as_path))?;
     let tables = timing::costs(results, &records).into_iter().collect();
-    let extras = Extras { pictures: kept(folder, images)?, curves, tables, bound: BOUND };
+    let mut extras = Extras { pictures: KeptPictures::default(), curves, tables, bound: BOUND };
+    let pictures = folder.join(PICTURES);
+    let Some(mut index) = index(&pictures, images)? else { return Ok(html(results, &extras)) };
+    // The run may have tables that the page has not.
+    let has = |table: &String| results.tables.iter().any(|own| own.experiment == *table);
+    index.frames.retain(|kept| has(&kept.table));
+    index.moving.retain(|of| has(&of.table));
+    extras.pictures.kept = index.frames.len();
+    extras.pictures.moving = index.moving.iter().map(|of| moving(&pictures, of)).collect::<Result<_>>()?;
+    extras.pictures.stills = stills(&pictures, &index.frames, FEW)?;
+    if index.frames.len() > FEW {
+        let fit = frames_that_fit(results, &extras, index.frames.len());
+        extras.pictures.stills = stills(&pictures, &index.frames, fit)?;
+    }
     Ok(html(results, &extras))
 }
+
+/// So many frames are read whatever comes of them; of more frames so many tell how many fit.
+const FEW: usize = 32;
 
 /// Writes a page and says how large it is.
 pub(super) fn write_page(path: &Path, html: &str, context: Context) -> Result<()> {
@@ -60,19 +76,21 @@ pub(super) fn write_page(path: &Path, html: &str, context: Context) -> Result<()
     Ok(())
 }
 
-/// The pictures that a run kept.
-fn kept(folder: &Path, images: Images) -> Result<KeptPictures> {
-    let folder = folder.join(PICTURES);
+/// Which pictures the run kept of those that are wanted; none if it kept none.
+fn index(folder: &Path, images: Images) -> Result<Option<Index>> {
     let path = folder.join(INDEX);
     if images == Images::None || !path.is_file() {
-        return Ok(KeptPictures::default());
+        return Ok(None);
     }
-    let index: Index = super::selection::read_json(&path)?;
-    let wanted = |kept: &&Kept| images == Images::All || kept.telling;
-    let stills =
-        index.frames.iter().filter(wanted).map(|kept| still(&folder, kept)).collect::<Result<_>>()?;
-    let moving = index.moving.iter().map(|of| moving(&folder, of)).collect::<Result<_>>()?;
-    Ok(KeptPictures { stills, moving })
+    let mut index: Index = super::selection::read_json(&path)?;
+    index.frames.retain(|kept| images == Images::All || kept.telling);
+    Ok(Some(index))
+}
+
+/// The pictures of at most so many frames, evenly spaced.
+fn stills(folder: &Path, frames: &[Kept], most: usize) -> Result<Vec<Stills>> {
+    let frames: Vec<&Kept> = frames.iter().collect();
+    evenly_spaced(&frames, Some(most)).into_iter().map(|kept| still(folder, kept)).collect()
 }
 
 fn still(folder: &Path, kept: &Kept) -> Result<Stills> {

@@ -1,11 +1,11 @@
 //! `reproduce report`: the tables of a run again, or against a baseline.
 
-use super::compare::{Comparing, folder, load};
+use super::compare::{Comparing, check_tables, folder, load, only};
 use super::output::{emit, save, written};
 use super::page::{Images, page, write_page};
 use super::selection::read_json;
 use super::{Context, Exit};
-use anyhow::{Result, anyhow};
+use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use skinsplat::report::{self, Results};
 use skinsplat::run::provenance::Phases;
@@ -21,9 +21,9 @@ pub(super) struct Report {
     /// Folder of a run, or its results.json
     #[arg(value_name = "RUN", default_value = super::run::DEFAULT_OUT)]
     run: PathBuf,
-    /// How to print the tables
-    #[arg(long, value_name = "FORMAT", value_parser = formats(), default_value = "markdown")]
-    format: String,
+    /// How to print the tables, or what moved [default: markdown; with --baseline text]
+    #[arg(long, value_name = "FORMAT", value_parser = formats())]
+    format: Option<String>,
     /// Write to a file [default: standard output]
     #[arg(long, value_name = "FILE", conflicts_with = "baseline")]
     out: Option<PathBuf>,
@@ -45,35 +45,40 @@ pub(super) struct Report {
 
 impl Report {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
-        let mut results = load(&self.run)?;
-        if let Some(id) = &self.table {
-            let known: Vec<String> = results.tables.iter().map(|table| table.experiment.clone()).collect();
-            results.tables.retain(|table| table.experiment == *id);
-            if results.tables.is_empty() {
-                return Err(anyhow!("--table {id}; expected one of {}", known.join(", ")));
-            }
-        }
+        let tables: Vec<String> = self.table.iter().cloned().collect();
+        let results = load(&self.run)?;
         if let Some(baseline) = &self.baseline {
-            let changes = self.comparing.compare(&load(baseline)?, &results)?;
-            // Formats of tables are of no use to it.
-            let format = if self.format == "json" { "json" } else { "text" };
-            return self.comparing.print(&changes, format, context);
+            let format = self.format("text");
+            if format == HTML {
+                bail!("--format html with --baseline; expected another format: what moved has no page");
+            }
+            let both = [load(baseline)?, results];
+            check_tables(&tables, &both)?;
+            let [before, after] = both.map(|results| only(&tables, results));
+            return self.comparing.print(&self.comparing.compare(&before, &after)?, format, context);
         }
+        check_tables(&tables, std::slice::from_ref(&results))?;
+        let results = only(&tables, results);
         let text = if self.timing { self.timing(&results)? } else { self.tables(&results)? };
         match &self.out {
-            Some(path) if self.format == HTML => write_page(path, &text, context)?,
+            Some(path) if self.format(MARKDOWN) == HTML => write_page(path, &text, context)?,
             Some(path) => save(path, &text)?,
             None => emit(&text)?,
         }
         Ok(if results.missing() > 0 { Exit::Incomplete } else { Exit::Success })
     }
 
+    /// The wanted format.
+    fn format<'a>(&'a self, default: &'a str) -> &'a str {
+        self.format.as_deref().unwrap_or(default)
+    }
+
     /// The tables in the wanted format.
     fn tables(&self, results: &Results) -> Result<String> {
         let tables = results.tables.iter().map(|table| &table.table);
-        Ok(match self.format.as_str() {
+        Ok(match self.format(MARKDOWN) {
             // With what is said around the tables, as in tables.md.
-            "markdown" => report::page(results),
+            MARKDOWN => report::page(results),
             HTML => page(results, folder(&self.run), self.images)?,
             // One document.
             "json" => to_json(&tables.collect::<Vec<_>>()),
@@ -82,14 +87,26 @@ impl Report {
     }
 
     fn timing(&self, results: &Results) -> Result<String> {
+        let format = self.format(MARKDOWN);
+        if format == HTML {
+            bail!(
+                "--format html with --timing; expected another format: a page of the tables has times at its end"
+            );
+        }
         let records = store::merge(store::stores(folder(&self.run))?.iter().map(PathBuf::as_path))?;
-        let mut tables = vec![report::timing::phases(results, &records)];
+        let mut tables: Vec<_> = report::timing::phases(results, &records).into_iter().collect();
         let path = folder(&self.run).join("run.json");
         if path.is_file() {
             let run: Timed = read_json(&path)?;
             run.phases.iter().for_each(|phases| tables.insert(0, report::timing::calls(phases)));
         }
-        let format = if self.format == HTML { "markdown" } else { &self.format };
+        if tables.is_empty() {
+            bail!(
+                "{}: no recorded times; expected the folder of a run, with its {} or run.json",
+                folder(&self.run).join(store::FILE_NAME).display(),
+                store::FILE_NAME
+            );
+        }
         Ok(match format {
             "json" => to_json(&tables),
             format => tables.iter().map(|table| written(table, format)).collect::<Vec<_>>().join("\n"),
@@ -105,6 +122,9 @@ struct Timed {
 
 /// The format of pages, beside those of tables.
 const HTML: &str = "html";
+
+/// The format of tables, unless another is asked for.
+const MARKDOWN: &str = "markdown";
 
 fn formats() -> PossibleValuesParser {
     let html = PossibleValue::new(HTML).help("one page for a browser, with charts and pictures");

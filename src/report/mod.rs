@@ -24,6 +24,7 @@ mod layout;
 mod markdown;
 mod page;
 mod paper;
+mod reading;
 mod replicates;
 mod results;
 pub mod timing;

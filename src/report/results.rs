@@ -2,10 +2,12 @@
 //! the machine. `reports/SCHEMA.md` describes it key by key.
 
 use super::comparison::Comparison;
+use super::reading::from_json;
 use crate::experiment::{AvatarRecipe, CodeVersions, FittedOutcome, Options, Shown, Source};
 use serde::{Deserialize, Serialize};
 use skinsplat_metrics::{FrameScore, ProtocolId, Summary};
 use skinsplat_table::{Digits, Table, to_json};
+use std::collections::BTreeSet;
 
 /// Version of the document's format.
 pub const SCHEMA: u32 = 4;
@@ -45,12 +47,14 @@ impl Results {
         struct Versioned {
             schema: u32,
         }
-        let versioned: Versioned = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        let what = "the results.json of a run (reports/SCHEMA.md)";
+        let versioned: Versioned = from_json(text, what)?;
         if !(OLDEST_SCHEMA..=SCHEMA).contains(&versioned.schema) {
             let expected = format!("{OLDEST_SCHEMA} to {SCHEMA}, which this program reads");
             return Err(format!("schema: {}; expected {expected}", versioned.schema));
         }
-        let results: Self = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        let results: Self = from_json(text, what)?;
+        once("tables: experiment", results.tables.iter().map(|table| table.experiment.as_str()))?;
         results.tables.iter().try_for_each(TableResults::check)?;
         Ok(results)
     }
@@ -60,6 +64,13 @@ impl Results {
         let variants = self.tables.iter().flat_map(|t| &t.sequences).flat_map(|sequence| &sequence.variants);
         variants.map(VariantResults::missing).sum()
     }
+}
+
+/// Refuses an id that comes twice: nobody could say which of the two is meant.
+fn once<'a>(place: &str, ids: impl Iterator<Item = &'a str>) -> Result<(), String> {
+    let mut seen = BTreeSet::new();
+    let again = ids.into_iter().find(|&id| !seen.insert(id));
+    again.map_or(Ok(()), |id| Err(format!("{place}: `{id}` twice; expected each once")))
 }
 
 /// One table and what it was made from.
@@ -96,6 +107,12 @@ impl TableResults {
                 "table `{}`: comparisons: decimals: {n}; expected at most {most}",
                 self.experiment
             ));
+        }
+        let place = format!("table `{}`: sequences", self.experiment);
+        once(&format!("{place}: id"), self.sequences.iter().map(|sequence| sequence.id.as_str()))?;
+        for SequenceResults { id, variants, .. } in &self.sequences {
+            let ids = variants.iter().map(|variant| variant.id.as_str());
+            once(&format!("{place}: `{id}`: variants: id"), ids)?;
         }
         self.table.check()?;
         self.paper.as_ref().map_or(Ok(()), Table::check)

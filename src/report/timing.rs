@@ -90,8 +90,9 @@ pub fn calls(phases: &Phases) -> Table {
     }
 }
 
-/// Where the time of the frames went, per table: seconds of posing, drawing and scoring, added over threads.
-pub fn phases(results: &Results, records: &Records) -> Table {
+/// Where the time of the frames went, per table: seconds of posing, drawing and scoring, added over threads. None without a
+/// record of the results.
+pub fn phases(results: &Results, records: &Records) -> Option<Table> {
     let mut table = Table {
         sentences: vec!["Seconds, added over the threads".to_owned()],
         labels: vec![Label::new("table", "Table").once(), Label::new("variant", "Variant")],
@@ -103,12 +104,14 @@ pub fn phases(results: &Results, records: &Records) -> Table {
         ],
         ..Table::new("timing", "Where the time went")
     };
+    let mut recorded = 0;
     for of in &results.tables {
         let Some(first) = of.sequences.first() else { continue };
         for (v, variant) in first.variants.iter().enumerate() {
             let frames =
                 of.sequences.iter().filter_map(|s| s.variants.get(v)).flat_map(|variant| &variant.frames);
             let seconds: Vec<&Seconds> = frames.filter_map(|f| Some(&records.get(&f.key)?.seconds)).collect();
+            recorded += seconds.len();
             let sum = |of: fn(&Seconds) -> f64| {
                 Cell::number(seconds.iter().map(|s| of(s)).sum(), Digits::Significant(3))
             };
@@ -118,5 +121,5 @@ pub fn phases(results: &Results, records: &Records) -> Table {
             table.rows.push(Row::new(id, [of.table.title.as_str(), &variant.label], cells));
         }
     }
-    table
+    (recorded > 0).then_some(table)
 }

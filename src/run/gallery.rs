@@ -19,7 +19,7 @@ const ERROR_GAIN: f32 = 4.0;
 /// Pixels around the subject that a crop keeps, as a part of its size.
 const MARGIN: f32 = 0.06;
 
-/// Writes the pictures into `folder` and returns a page that shows them.
+/// Writes the pictures into `folder` and returns a page that shows them. What has no score is not drawn.
 ///
 /// # Errors
 /// An avatar or a frame that cannot be made, or a folder that cannot be written.
@@ -32,7 +32,8 @@ pub fn write(
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<String, Error> {
     std::fs::create_dir_all(folder).map_err(|source| Error::Folder { path: folder.to_owned(), source })?;
-    let chosen = most_telling(plan, records);
+    let scored = scored(&plan.jobs, records);
+    let chosen = most_telling(&scored, records);
     let jobs: Vec<Job> = chosen.iter().map(|&job| job.clone()).collect();
     let avatars = prepare_avatars(plan, &jobs, library, avatars, watch)?;
     watch(Event::Frames(jobs.len()));
@@ -69,10 +70,22 @@ pub fn write(
     Ok(page)
 }
 
+/// The jobs with those of their variants that have a score: what could not be drawn then cannot be drawn now.
+pub(super) fn scored(jobs: &[Job], records: &Records) -> Vec<Job> {
+    let has_score =
+        |key: &str| records.get(key).is_some_and(|record| matches!(record.outcome, Outcome::Scored { .. }));
+    let reduced = |job: &Job| {
+        let variants: Vec<_> =
+            job.variants.iter().filter(|variant| has_score(&variant.key)).cloned().collect();
+        (!variants.is_empty()).then(|| Job { variants, ..job.clone() })
+    };
+    jobs.iter().filter_map(reduced).collect()
+}
+
 /// Per table and sequence, the first job with the widest spread of PSNR.
-fn most_telling<'a>(plan: &'a Plan, records: &Records) -> Vec<&'a Job> {
+fn most_telling<'a>(jobs: &'a [Job], records: &Records) -> Vec<&'a Job> {
     let mut best: Vec<(&Job, f64)> = Vec::new();
-    for job in &plan.jobs {
+    for job in jobs {
         let Some(spread) = spread(job, records) else { continue };
         match best.last_mut() {
             Some((last, widest)) if (last.table, last.row) == (job.table, job.row) => {

@@ -4,7 +4,7 @@
 use super::drawable::{Behind, Scratch};
 use super::execute::{Avatars, look, prepare_avatars, test_sequence};
 use super::frame::{Frame, behind};
-use super::gallery::{crop, picture_name, spread};
+use super::gallery::{crop, picture_name, scored, spread};
 use super::{Error, Event, Library};
 use crate::experiment::{Job, Plan, Records};
 use image::RgbImage;
@@ -77,14 +77,14 @@ pub struct Moving {
     pub file: String,
     /// What stands side by side, from the left: the truth, then ids of variants.
     pub columns: Vec<String>,
-    /// How many frames of how many it shows.
+    /// How many frames of how many that have scores it shows.
     pub frames: [usize; 2],
 }
 
 /// Name of the index in the folder of pictures.
 pub const INDEX: &str = "index.json";
 
-/// Draws and writes the pictures.
+/// Draws and writes the pictures of what has a score: what could not be drawn for one has no picture either.
 ///
 /// # Errors
 /// An avatar or a frame that cannot be made, or a folder that cannot be written.
@@ -98,7 +98,8 @@ pub fn write(
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<Index, Error> {
     make(folder)?;
-    let groups = by_sequence(&plan.jobs);
+    let scored = scored(&plan.jobs, records);
+    let groups = by_sequence(&scored);
     let chosen: Vec<(Vec<&Job>, Chosen)> =
         groups.into_iter().map(|jobs| (jobs.clone(), Chosen::of(&jobs, records, keep))).collect();
     let jobs: Vec<Job> =
@@ -148,7 +149,7 @@ impl Chosen {
         let all = || (0..jobs.len()).collect::<Vec<usize>>();
         let moving = match keep {
             Keep::None => BTreeSet::new(),
-            Keep::Key | Keep::All => evenly_spaced(&all(), Some(MOVING)).into_iter().collect(),
+            Keep::Key | Keep::All => evenly_spaced(&alike(jobs), Some(MOVING)).into_iter().collect(),
         };
         let mut by_spread: Vec<(usize, f64)> =
             all().into_iter().filter_map(|i| Some((i, spread(jobs[i], records)?))).collect();
@@ -165,6 +166,14 @@ impl Chosen {
     fn drawn(&self) -> impl Iterator<Item = usize> {
         self.stills.union(&self.moving).copied()
     }
+}
+
+/// The frames that have pictures of the same variants, as many as any frame has: a moving picture keeps its columns.
+fn alike(jobs: &[&Job]) -> Vec<usize> {
+    let most = jobs.iter().map(|job| job.variants.len()).max().unwrap_or(0);
+    let ids = |job: &Job| job.variants.iter().map(|variant| variant.id.clone()).collect::<Vec<_>>();
+    let columns = jobs.iter().find(|job| job.variants.len() == most).map(|job| ids(job));
+    (0..jobs.len()).filter(|&i| columns.as_ref() == Some(&ids(jobs[i]))).collect()
 }
 
 /// One row of a table.
@@ -191,6 +200,7 @@ impl Sequence<'_> {
         let sequence = test_sequence(first, self.library)?;
         let mut scratch = Scratch::default();
         let mut moving = Vec::new();
+        let mut columns = vec!["truth".to_owned()];
         for i in wanted.drawn() {
             let job = self.jobs[i];
             let drawn = self.draw(job, &Frame::load(&sequence, job.frame, None)?, &mut scratch)?;
@@ -199,6 +209,9 @@ impl Sequence<'_> {
                 index.frames.push(Kept { telling, ..self.still(job, &drawn)? });
             }
             if wanted.moving.contains(&i) {
+                if moving.is_empty() {
+                    columns.extend(job.variants.iter().map(|variant| variant.id.clone()));
+                }
                 moving.push(drawn);
             }
             watch(Event::FrameDone);
@@ -212,9 +225,7 @@ impl Sequence<'_> {
             table: table.experiment.clone(),
             sequence: table.rows[row].id.clone(),
             file,
-            columns: std::iter::once("truth".to_owned())
-                .chain(first.variants.iter().map(|v| v.id.clone()))
-                .collect(),
+            columns,
             frames: [moving.len(), self.jobs.len()],
         });
         Ok(())

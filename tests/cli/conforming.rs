@@ -156,6 +156,27 @@ fn exports_that_are_wrong_are_one_line() {
     for (arguments, parts) in [
         (args!["export", "rig/avatar.ply", "--to", "glb", "--out", "a.glb"], vec!["--body"]),
         (args!["export", "rig/avatar.ply", "--to", "glb", "--body", "rig/body.glb"], vec!["--out"]),
+        (args!["export", "rig/avatar.ply", "--to", "glb", "--out", "x.ply"], vec!["x.ply", "ends in .glb"]),
+        (
+            args!["export", "rig/avatar.ply", "--to", "posed-ply", "--out", "x.glb"],
+            vec!["x.glb", "ends in .ply"],
+        ),
+        (
+            args![
+                "export",
+                "rig/avatar.ply",
+                "--body",
+                "rig/body.glb",
+                "--poses",
+                "rig/body.glb",
+                "--all-frames",
+                "--to",
+                "skinned-glb",
+                "--out",
+                "s.glb"
+            ],
+            vec!["--all-frames", "skinned-glb"],
+        ),
         (args!["export", "rig/avatar.ply", "--to", "fbx", "--out", "a.fbx"], vec!["fbx", "skinned-glb"]),
         (args!["export", "rig/avatar.ply", "--to", "glb", "--degree", "4", "--out", "a"], vec!["4"]),
         (

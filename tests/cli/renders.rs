@@ -91,6 +91,27 @@ fn gaps_and_wrong_sizes_are_named() {
     run(&desk, "none", &["--renders", "other=theirs/tiny"]).exits(2, "no such variant");
 }
 
+/// What has no score has no picture, and a page says so.
+#[test]
+fn a_gap_leaves_the_page_and_its_pictures() {
+    let desk = desk();
+    std::fs::remove_file(desk.path("theirs/tiny/image_0001.png")).unwrap();
+    let renders = "surface=theirs/tiny";
+    run(&desk, "run", &["--renders", renders, "--html", "p.html", "--images", "all"])
+        .exits(3, "one is missing");
+    assert!(desk.read("p.html").contains("Incomplete: 1 score missing"));
+    let index: Value = serde_json::from_str(&desk.read("run/pictures/index.json")).unwrap();
+    let frames = index["frames"].as_array().unwrap();
+    let has = |frame: &str| {
+        let of = frames.iter().find(|own| own["frame"] == frame).unwrap();
+        of["variants"].as_array().unwrap().iter().any(|variant| variant[0] == "surface")
+    };
+    assert_eq!(["image_0000", "image_0001", "image_0002"].map(has), [true, false, true]);
+    // A moving picture has all of its columns in every frame.
+    assert_eq!(index["moving"][0]["frames"][0], 2, "{index}");
+    assert!(desk.path("run/images/README.md").is_file());
+}
+
 /// A subject that cannot be read costs its own row, with the reason, and no other.
 #[test]
 fn half_a_data_set_gives_half_a_table() {

@@ -69,6 +69,34 @@ fn a_worse_result_is_exit_code_1() {
     compare("other.json", &[]).exits(3, "nothing in common");
 }
 
+/// `report --baseline` says what `compare` says, of the tables that were asked for and in the format that was asked for.
+#[test]
+fn a_baseline_is_reported_as_compare_does() {
+    let desk = finished();
+    let mut two: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
+    let mut other = two["tables"][0].clone();
+    other["experiment"] = Value::from("other");
+    two["tables"].as_array_mut().unwrap().push(other);
+    desk.put("two.json", two.to_string());
+    let one = desk.run(args!["report", "two.json", "--baseline", "two.json", "--table", "tiny"]);
+    let one = one.exits(0, "one table of two").out;
+    assert!(one.contains("unchanged") && !one.contains("other"), "{one}");
+    desk.run(args!["report", "two.json", "--baseline", "two.json", "--table", "third"])
+        .refuses(&["third", "other, tiny"], "no such table");
+    for format in ["text", "markdown", "csv", "latex", "json"] {
+        let report =
+            desk.ok(args!["report", "run", "--baseline", "two.json", "--table", "tiny", "--format", format]);
+        let compare = desk.ok(args!["compare", "two.json", "run", "--table", "tiny", "--format", format]);
+        assert_eq!(report, compare, "{format}");
+    }
+    desk.run(args!["report", "run", "--baseline", "run", "--format", "html"])
+        .refuses(&["--format html", "--baseline"], "no page of what moved");
+    desk.run(args!["report", "run", "--timing", "--format", "html", "--out", "t.html"])
+        .refuses(&["--format html", "--timing"], "no page of times");
+    desk.run(args!["report", "two.json", "--timing"])
+        .refuses(&["frames.jsonl", "no recorded times"], "no times");
+}
+
 #[test]
 fn an_incomplete_run_is_exit_code_3() {
     let desk = Desk::new();
@@ -79,6 +107,12 @@ fn an_incomplete_run_is_exit_code_3() {
     let answer = desk.run(args!["run", "tiny.toml", "--out", "run"]).exits(3, "no such subject");
     assert!(answer.err.contains("no frame"), "{}", answer.err);
     assert!(desk.read("run/tables.md").contains("no subject \\`nobody\\`"));
+}
+
+/// The first item of a list again at its end.
+fn twice(items: &mut Value) {
+    let first = items[0].clone();
+    items.as_array_mut().unwrap().push(first);
 }
 
 #[test]
@@ -92,16 +126,38 @@ fn what_is_no_result_is_named() {
     };
     for (content, parts) in [
         (String::new(), vec!["bad.json"]),
-        ("[]".to_owned(), vec!["bad.json"]),
+        ("[]".to_owned(), vec!["bad.json", "a list; expected an object", "SCHEMA.md"]),
         (changed(|r| r["schema"] = Value::from(99)), vec!["bad.json", "schema", "99"]),
-        (changed(|r| r["tables"] = Value::from("none")), vec!["bad.json", "expected a sequence"]),
+        (
+            changed(|r| r["tables"] = Value::from("none")),
+            vec!["bad.json", "tables: text \"none\"; expected a list"],
+        ),
         (changed(|r| r["extra"] = Value::from(1)), vec!["bad.json", "extra"]),
         (
             changed(|r| {
                 r["tables"][0]["sequences"][0]["variants"][0]["summary"]["values"]["psnr"] =
                     Value::from("high")
             }),
-            vec!["bad.json"],
+            vec![
+                "bad.json: tables[0].sequences[0].variants[0].summary.values.psnr: text \"high\"; expected a number",
+                "SCHEMA.md",
+            ],
+        ),
+        (
+            changed(|r| {
+                r["tables"][0]["sequences"][0]["variants"][1]["frames"][0]["score"]["values"]["ssim"] =
+                    Value::Null
+            }),
+            vec!["bad.json: tables[0].sequences[0].variants[1].frames[0].score: `ssim` is null", "a number"],
+        ),
+        (changed(|r| twice(&mut r["tables"])), vec!["tables: experiment: `tiny` twice"]),
+        (
+            changed(|r| twice(&mut r["tables"][0]["sequences"])),
+            vec!["sequences: id", "twice; expected each once"],
+        ),
+        (
+            changed(|r| twice(&mut r["tables"][0]["sequences"][0]["variants"])),
+            vec!["variants: id", "twice; expected each once"],
         ),
         (desk.read("run/results.json")[..400].to_owned(), vec!["bad.json", "line"]),
     ] {

@@ -9,6 +9,7 @@ mod experiments;
 mod formats;
 mod made_up;
 mod metrics;
+mod pages;
 mod plans;
 mod poses;
 mod reports;

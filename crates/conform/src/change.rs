@@ -33,6 +33,7 @@ pub(crate) enum Change {
         direction: bool,
         turn: Turn,
     },
+    DirectionReversed,
     Basis(Basis),
     Mirror(usize),
     Axes(Axes),
@@ -82,6 +83,7 @@ impl Change {
             Self::Product(Product::CanonicalForgotten),
             Self::Covariance(Covariance::Blended),
             Self::Covariance(Covariance::NotSquared),
+            Self::DirectionReversed,
             Self::Opacity(Activation::Twice),
             Self::Opacity(Activation::Never),
             Self::Layout(ShLayout::Planar),
@@ -145,6 +147,7 @@ impl Change {
                     wiring.direction = turn;
                 }
             }
+            Self::DirectionReversed => wiring.direction_is_reversed = true,
             Self::Basis(basis) => wiring.basis = basis,
             Self::Mirror(axis) => wiring.mirror = Some(axis),
             Self::Axes(axes) => wiring.axes = axes,
@@ -195,6 +198,7 @@ impl Change {
             Self::Covariance(_) => "blended-matrix-not-projected",
             Self::Turned { turn: Turn::Backwards, .. } => "sh-turned-backwards",
             Self::Turned { .. } => "sh-not-turned",
+            Self::DirectionReversed => "direction-reversed",
             Self::Basis(_) => "sh-basis-sign",
             Self::Mirror(_) => "mirrored-handedness",
             Self::Axes(Axes::World(Turned::Half) | Axes::Both(Turned::Half)) => "y-down-for-y-up",
@@ -326,6 +330,9 @@ impl Change {
                 "SH (or view directions) are turned by the inverse rotation"
             }
             Self::Turned { .. } => "SH (or view directions) are not turned with the Gaussians",
+            Self::DirectionReversed => {
+                "view directions point from the Gaussian to the camera: camera minus mean in place of mean minus camera"
+            }
             Self::Basis(_) => "SH were turned in a basis with other signs",
             Self::Mirror(_) => "the answer is mirrored: its axes have the other handedness",
             Self::Axes(Axes::World(Turned::Half) | Axes::Both(Turned::Half)) => {

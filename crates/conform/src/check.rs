@@ -14,7 +14,7 @@ use std::path::Path;
 /// How an answer is to be judged.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// The convention of the answer, where it is not that of the folder.
+    /// The convention of the answer, where it is not that of the folder's vectors or, for PLYs, the default one.
     pub convention: Option<Convention>,
     /// Which pose a single PLY is of.
     pub frame: Option<usize>,
@@ -44,10 +44,14 @@ pub fn check(folder: &Path, answer: &Path, options: &Options) -> Result<Report, 
         return Err(Error::new("--tolerance", problem, "a finite number above 0"));
     }
     let exported = manifest::read(folder)?;
-    let convention = options.convention.unwrap_or(exported.convention);
-    let declared = options.convention.is_some() || convention != Convention::default();
     let rig = Rig::new(exported.cases)?;
     let mut given = Answer::read(answer, &rig, options.frame)?;
+    let convention = options.convention.unwrap_or(match given.storage {
+        Storage::Activated => exported.convention,
+        // PLYs of the rig are in the axes of their format, whatever the convention of its vectors.
+        Storage::Logarithms => Convention::default(),
+    });
+    let declared = options.convention.is_some() || convention != Convention::default();
     given.agrees_with(&convention, answer)?;
     let frames = match given.frames.clone() {
         Some(frames) => frames,

@@ -23,6 +23,8 @@ pub(crate) struct Wiring {
     /// Bands 1 to 3.
     pub(crate) sh: [Turn; 3],
     pub(crate) direction: Turn,
+    /// From the Gaussian to the camera.
+    pub(crate) direction_is_reversed: bool,
     pub(crate) basis: Basis,
     pub(crate) mirror: Option<usize>,
     pub(crate) axes: Axes,

@@ -144,6 +144,14 @@ fn single_bugs_are_named_in_ply() {
     expect(&of_ply(&right, &["scale", "opacity"]), &["activated-opacity", "activated-scale"], "both");
 }
 
+/// Only directions tell.
+#[test]
+fn reversed_directions_are_named() {
+    let report = of_json(&skin(&bench().inputs, &["direction-reversed"]));
+    expect(&report, &["direction-reversed"], "from the Gaussian to the camera");
+    assert_eq!(report.explanations[0]["fields"], serde_json::json!(["directions"]));
+}
+
 #[test]
 fn what_is_known_of_a_bug_is_said() {
     let detail = |bug: &str, key: &str| {
@@ -162,7 +170,7 @@ fn what_is_known_of_a_bug_is_said() {
 }
 
 /// Two bugs at once, and both names.
-const PAIRS: [([&str; 2], &[&str]); 14] = [
+const PAIRS: [([&str; 2], &[&str]); 15] = [
     (["xyzw-for-wxyz", "sh-not-turned"], &["sh-not-turned", "xyzw-for-wxyz"]),
     (["signs-not-aligned", "sh-not-turned"], &["sh-not-turned", "signs-not-aligned"]),
     (["dual-quaternions", "weights-cut-to-four"], &["dual-quaternions", "weights-cut-to-four"]),
@@ -179,6 +187,7 @@ const PAIRS: [([&str; 2], &[&str]); 14] = [
         &["weights-cut-to-four", "weights-not-normalised", "xyzw-for-wxyz"],
     ),
     (["not-normalised", "weights-quantised"], &["not-normalised", "weights-quantised"]),
+    (["direction-reversed", "sh-not-turned"], &["direction-reversed", "sh-not-turned"]),
     (["sh-basis-sign-out", "signs-not-aligned"], &["sh-basis-sign", "signs-not-aligned"]),
 ];
 
@@ -245,6 +254,15 @@ fn another_convention_and_its_orders() {
             let error = check(folder.path(), &path, &options).unwrap_err().to_string();
             assert!(error.contains("convention") && error.contains("as declared"), "{error}");
         }
+        // PLYs are in one convention, whatever that of the vectors.
+        for file in ["expected", "expected/pose_0003.ply"] {
+            let report = check(folder.path(), &folder.path().join(file), &Options::default()).unwrap();
+            assert_eq!(report.verdict, Verdict::Conforms, "{name} {file}: {}", report.text());
+            let options = Options { convention: Some(convention), ..Options::default() };
+            let declared = check(folder.path(), &folder.path().join(file), &options);
+            let same = convention.map == Convention::default().map;
+            assert_eq!(declared.is_ok(), same, "{name} {file}");
+        }
         // Numbers that say nothing of their convention, declared as what they are not.
         let bare = folder.path().join("bare.json");
         std::fs::write(&bare, json_of(&skin(&bench().inputs, &[]), &FIELDS)).unwrap();
@@ -301,6 +319,69 @@ fn bad_answers_are_one_line() {
             assert!(error.contains(part), "{what}: `{part}` in {error}");
         }
     }
+}
+
+/// Another order is seen where means are wrong too, by what no pose changes; and is not seen where there is none.
+#[test]
+fn another_order_is_seen_beside_other_bugs() {
+    for bug in ["row-major-matrices", "bind-pose-missing", "one-frame-late", "scale-ball"] {
+        let mut outs = skin(&bench().inputs, &[bug, "bind-pose-missing"]);
+        outs.iter_mut().for_each(|pose| pose.reverse());
+        for answer in [json_of(&outs, &FIELDS), json_of(&outs, &["means", "quaternions", "sh"])] {
+            let error = of_text(answer).map(|report| report.text()).unwrap_err().to_string();
+            assert!(error.contains("place 0 holds Gaussian 53, and 54 of 54"), "{bug}: {error}");
+        }
+    }
+    // Opacities of two Gaussians swapped: everything else says that the order is right.
+    let mut outs = skin(&bench().inputs, &["bind-pose-missing"]);
+    for pose in &mut outs {
+        (pose[3].opacity, pose[20].opacity) = (pose[20].opacity, pose[3].opacity);
+    }
+    expect(&of_json(&outs), &["bind-pose-missing", "unknown"], "swapped opacities");
+}
+
+/// As many numbers in another order, of other extents or of no covariance.
+#[test]
+fn arrays_of_another_shape_are_refused() {
+    let outs = skin(&bench().inputs, &[]);
+    let (poses, gaussians) = (outs.len(), outs[0].len());
+    let mean = |pose: usize, i: usize| serde_json::json!(outs[pose][i].mean);
+    let nested = |outer: usize, inner: usize, at: &dyn Fn(usize, usize) -> serde_json::Value| {
+        (0..outer).map(|a| (0..inner).map(|b| at(a, b)).collect()).collect::<Vec<Vec<_>>>()
+    };
+    let full = |upper: [f64; 6]| {
+        let [xx, xy, xz, yy, yz, zz] = upper;
+        serde_json::json!([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    };
+    let right = serde_json::json!({
+        "means": nested(poses, gaussians, &mean).concat().iter().flat_map(|v| v.as_array().unwrap().clone()).collect::<Vec<_>>(),
+        "covariances": nested(poses, gaussians, &|pose, i| full(outs[pose][i].covariance)),
+        "opacities": nested(poses, gaussians, &|pose, i| serde_json::json!([outs[pose][i].opacity])),
+    });
+    assert_eq!(of_text(right.to_string()).unwrap().verdict, Verdict::Conforms);
+    let alone =
+        serde_json::json!({ "frame": 2, "means": outs[2].iter().map(|o| o.mean).collect::<Vec<_>>() });
+    assert_eq!(of_text(alone.to_string()).unwrap().verdict, Verdict::Conforms);
+    let turned = serde_json::json!({ "means": nested(gaussians, poses, &|i, pose| mean(pose, i)) });
+    let mut ragged = serde_json::json!({ "means": nested(poses, gaussians, &mean) });
+    let moved = ragged["means"][1][3].as_array_mut().unwrap().pop().unwrap();
+    ragged["means"][1][4].as_array_mut().unwrap().push(moved);
+    let mut one_sided = right.clone();
+    one_sided["covariances"][1][3][0][2] = serde_json::json!(0.5);
+    for (what, answer, parts) in [
+        ("Gaussian by Gaussian", turned, ["means", "54 x 6 x 3", "6 x 54 x 3"]),
+        ("ragged", ragged, ["means[1][3]", "a list of 2", "a list of 3"]),
+        ("one-sided", one_sided, ["covariances[1][3]", "0.5", "symmetric"]),
+    ] {
+        let error = of_text(answer.to_string()).map(|report| report.text()).unwrap_err().to_string();
+        assert!(parts.iter().all(|part| error.contains(part)) && !error.contains('\n'), "{what}: {error}");
+    }
+    // Flat binary says its extents too: the first block is means.
+    let mut bytes = binary(&outs, "");
+    bytes[40 + 32..40 + 36].copy_from_slice(&(gaussians as u32).to_le_bytes());
+    bytes[40 + 36..40 + 40].copy_from_slice(&(poses as u32).to_le_bytes());
+    let error = of_text(bytes).map(|report| report.text()).unwrap_err().to_string();
+    assert!(error.contains("54 x 6 x 3"), "{error}");
 }
 
 #[test]

@@ -42,7 +42,14 @@ pub struct Point {
 }
 
 const SIZE: [f64; 2] = [640.0, 260.0];
-const MARGIN: [f64; 4] = [76.0, 28.0, 12.0, 48.0];
+/// Right, above, below; and the least on the left.
+const MARGIN: [f64; 3] = [28.0, 12.0, 48.0];
+const LEFT: f64 = 76.0;
+/// Width of a digit where the letters are largest (style.css, on narrow screens), and what the title of the axis takes beside them.
+const DIGIT: f64 = 11.0;
+const TITLE: f64 = 24.0;
+/// From a label to its axis.
+const GAP: f64 = 6.0;
 /// Colours of the style sheet; from there on with another dash.
 const COLOURS: usize = 7;
 
@@ -115,7 +122,7 @@ impl Chart {
         let points = || self.series.iter().flat_map(|s| &s.points);
         let x = Axis::of(points().map(|p| p.x), self.log[0]);
         let y = Axis::of(points().map(|p| p.y), self.log[1]);
-        let frame = Frame { x, y };
+        let frame = Frame::new(x, y);
         let left_out = self.left_out();
         html! {
             figure.chart {
@@ -157,16 +164,24 @@ fn class(series: usize) -> String {
 struct Frame {
     x: Axis,
     y: Axis,
+    /// Where it begins: right of the longest label and of the axis's title.
+    left: f64,
 }
 
 impl Frame {
+    fn new(x: Axis, y: Axis) -> Self {
+        let longest = y.ticks.iter().map(|(_, label)| label.chars().count()).max().unwrap_or(0);
+        let left = LEFT.max(TITLE + DIGIT * longest as f64 + GAP);
+        Self { x, y, left }
+    }
+
     fn place_x(&self, value: f64) -> Option<f64> {
-        let [left, right, ..] = MARGIN;
-        Some(left + self.x.at(value)? * (SIZE[0] - left - right))
+        let [right, ..] = MARGIN;
+        Some(self.left + self.x.at(value)? * (SIZE[0] - self.left - right))
     }
 
     fn place_y(&self, value: f64) -> Option<f64> {
-        let [_, _, top, bottom] = MARGIN;
+        let [_, top, bottom] = MARGIN;
         Some(SIZE[1] - bottom - self.y.at(value)? * (SIZE[1] - top - bottom))
     }
 
@@ -175,15 +190,15 @@ impl Frame {
     }
 
     fn grid(&self, x: &str, y: &str) -> Markup {
-        let [left, right, top, bottom] = MARGIN;
+        let ([right, top, bottom], left) = (MARGIN, self.left);
         let [width, height] = SIZE;
         let xs = self.x.ticks.iter().filter_map(|(at, label)| Some((self.place_x(*at)?, label)));
         let ys = self.y.ticks.iter().filter_map(|(at, label)| Some((self.place_y(*at)?, label)));
         html! {
             g.grid {
                 @for (at, label) in ys {
-                    line x1=(left) x2=(width - right) y1=(n(at)) y2=(n(at)) {}
-                    text x=(left - 6.0) y=(n(at + 4.0)) text-anchor="end" { (label) }
+                    line x1=(n(left)) x2=(width - right) y1=(n(at)) y2=(n(at)) {}
+                    text x=(n(left - GAP)) y=(n(at + 4.0)) text-anchor="end" { (label) }
                 }
                 @for (at, label) in xs {
                     line x1=(n(at)) x2=(n(at)) y1=(top) y2=(height - bottom) {}
@@ -253,6 +268,19 @@ mod tests {
         assert_eq!(html.matches("<circle").count(), 2, "{html}");
         assert!(html.contains("1 of the points cannot be drawn"), "{html}");
         assert!(!html.contains("NaN") && !html.contains("inf\""), "{html}");
+    }
+
+    /// Letters are largest where the page is narrow: 19 units high, 11 a digit.
+    #[test]
+    fn labels_stay_beside_the_title_of_their_axis() {
+        for values in [[0.998_51, 0.998_59], [12.0, 1e7], [1.0, 2.0]] {
+            let frame =
+                Frame::new(Axis::of([0.0, 9.0].into_iter(), false), Axis::of(values.into_iter(), false));
+            let longest = frame.y.ticks.iter().map(|(_, label)| label.len()).max().unwrap();
+            // The title stands at 16 and reaches a few units to its right.
+            assert!(frame.left - 6.0 - 11.0 * longest as f64 >= 22.0, "{values:?}: {}", frame.left);
+            assert!(frame.left < SIZE[0] / 3.0);
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 /// The text on one line, with nothing that moves a cursor or turns the direction of writing: spaces for line ends and tabs,
 /// `\u{1b}` for other control characters.
-pub(crate) fn visible(text: &str) -> Cow<'_, str> {
+pub fn visible(text: &str) -> Cow<'_, str> {
     if !text.chars().any(is_hidden) {
         return Cow::Borrowed(text);
     }

@@ -5,6 +5,7 @@
 use super::tables::finer;
 use super::{Changes, Fate, Line};
 use skinsplat_metrics::MetricId;
+use skinsplat_table::visible;
 
 /// Annotations of one level that GitHub shows per step.
 const SHOWN: usize = 10;
@@ -64,9 +65,10 @@ fn frames(changes: &Changes, line: &Line, metric: MetricId) -> String {
     if names.is_empty() { String::new() } else { format!("; most in {}", names.join(", ")) }
 }
 
-/// A workflow command: what it says ends no line and starts no other command.
+/// A workflow command: what it says ends no line, starts no other command and moves no cursor.
 fn command(level: &str, title: &str, message: &str) -> String {
-    let data = |text: &str| text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A");
+    let escaped = |text: &str| text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A");
+    let data = |text: &str| visible(&escaped(text)).into_owned();
     let property = |text: &str| data(text).replace(':', "%3A").replace(',', "%2C");
     format!("::{level} title={}::{}\n", property(title), data(message))
 }
@@ -78,5 +80,11 @@ mod tests {
         let made = super::command("error", "a,b: 5%\n::error::x", "100 %\r\n::stop-commands::y");
         let expected = "::error title=a%2Cb%3A 5%25%0A%3A%3Aerror%3A%3Ax::100 %25%0D%0A::stop-commands::y\n";
         assert_eq!(made, expected);
+    }
+
+    #[test]
+    fn names_command_no_terminal() {
+        let made = super::command("notice", "a\u{1b}[31m", "b\u{202e}c");
+        assert_eq!(made, "::notice title=a\\u{1b}[31m::b\\u{202e}c\n");
     }
 }

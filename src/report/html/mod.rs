@@ -41,6 +41,23 @@ pub fn html(results: &Results, extras: &Extras) -> String {
     html
 }
 
+/// Of how many of `kept` frames a page can show pictures, as far as a few of them tell: those among the extras, which stand for
+/// all. Who has thousands of frames reads so many and no more.
+pub fn frames_that_fit(results: &Results, extras: &Extras, kept: usize) -> usize {
+    let sample = extras.pictures.stills.len();
+    let bytes = |frames: usize| {
+        let budget = Budget::smallest(&extras.pictures, frames);
+        page(results, extras, &budget).html().len()
+    };
+    let rest = bytes(0);
+    let each = bytes(sample).saturating_sub(rest) as f64 / sample.max(1) as f64;
+    let room = SAFE * extras.bound.saturating_sub(rest) as f64;
+    if each > 0.0 { kept.min((room / each) as usize) } else { kept }
+}
+
+/// The part of the room that pictures are chosen for: those that were not looked at may be larger.
+const SAFE: f64 = 0.9;
+
 fn page(results: &Results, extras: &Extras, budget: &Budget) -> Page {
     let titles: Vec<&str> = results.tables.iter().map(|table| table.table.title.as_str()).collect();
     let mut page = Page::new(match titles.as_slice() {
@@ -48,7 +65,8 @@ fn page(results: &Results, extras: &Extras, budget: &Budget) -> Page {
         _ => "Results".to_owned(),
     });
     page = page.lead(format!(
-        "Made by `{}`. Bold is the best value of a sequence, with everything that the frames do not decide to be worse. ↑: more is \
+        "Made by `{}`. Bold is the best value of a sequence, with everything that the frames do not decide to be worse: where \
+         they are too few to decide anything, all of it. Counts are bold only where they are what the table is about. ↑: more is \
          better, ↓: less is better; n/c: not computed. Headings sort; whoever points at a number sees all of its digits, or its \
          interval.",
         super::page::command(results)

@@ -16,6 +16,8 @@ pub struct KeptPictures {
     pub stills: Vec<Stills>,
     /// Moving pictures.
     pub moving: Vec<MovingPicture>,
+    /// Of how many frames the run kept pictures, if those of some were not read.
+    pub kept: usize,
 }
 
 /// The pictures of a frame.
@@ -42,7 +44,7 @@ pub struct MovingPicture {
     pub sequence: String,
     /// The truth and ids of variants, from the left.
     pub columns: Vec<String>,
-    /// How many frames of how many it shows.
+    /// How many frames of how many that have scores it shows.
     pub frames: [usize; 2],
     /// The file, a GIF.
     pub gif: Vec<u8>,
@@ -68,6 +70,7 @@ pub(super) struct Budget {
     step: usize,
     frames: usize,
     of: usize,
+    kept: usize,
     moving: usize,
 }
 
@@ -80,8 +83,14 @@ impl Budget {
             step: 0,
             frames: pictures.stills.len(),
             of: pictures.stills.len(),
+            kept: pictures.kept.max(pictures.stills.len()),
             moving: pictures.moving.len(),
         }
+    }
+
+    /// The smallest pictures of so many frames, and all moving ones.
+    pub(super) fn smallest(pictures: &KeptPictures, frames: usize) -> Self {
+        Self { step: SIDES.len() - 1, frames, ..Self::new(pictures) }
     }
 
     /// The next smaller one; false if there is none.
@@ -101,8 +110,8 @@ impl Budget {
     /// What was given up.
     pub(super) fn says(&self, bound: usize) -> Option<String> {
         let megabytes = bound as f64 / 1e6;
-        if self.frames < self.of {
-            let (frames, of) = (self.frames, self.of);
+        if self.frames < self.kept {
+            let (frames, of) = (self.frames, self.kept);
             Some(format!(
                 "Pictures of {frames} of the {of} frames that the run kept, so that the page stays below {megabytes} MB."
             ))

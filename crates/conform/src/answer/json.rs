@@ -24,7 +24,7 @@ pub(super) fn read(bytes: &[u8], expected: &Expected) -> Result<Answer, Error> {
     for (name, value) in &document {
         if layout::is_field(name) {
             let mut array = Array { name: name.clone(), values: Vec::new(), shape: shape(value) };
-            flatten(name, value, &mut array.values)?;
+            flatten(name, value, &array.shape, &mut array.values)?;
             arrays.push(array);
         } else if !KNOWN.contains(&name.as_str()) {
             unread.push(name.chars().take(40).collect::<String>());
@@ -60,24 +60,38 @@ fn shape(value: &Value) -> Vec<usize> {
     shape
 }
 
-/// Numbers of nested arrays in their order; the error's place is the index of what is no number.
-fn flatten(place: &str, value: &Value, numbers: &mut Vec<f64>) -> Result<(), Error> {
-    match value {
-        Value::Number(number) => numbers.push(number.as_f64().unwrap_or(f64::NAN)),
-        Value::Array(entries) => {
+/// Numbers of nested arrays of these extents in their order; the error's place is the index of what is no number, or of a list
+/// that has another length than the first.
+fn flatten(place: &str, value: &Value, shape: &[usize], numbers: &mut Vec<f64>) -> Result<(), Error> {
+    match (value, shape) {
+        (Value::Number(number), []) => numbers.push(number.as_f64().unwrap_or(f64::NAN)),
+        (Value::Array(entries), [length, rest @ ..]) if entries.len() == *length => {
             for (i, entry) in entries.iter().enumerate() {
-                match entry.as_f64() {
+                match entry.as_f64().filter(|_| rest.is_empty()) {
                     Some(number) => numbers.push(number),
-                    None => flatten(&format!("{place}[{i}]"), entry, numbers)?,
+                    None => flatten(&format!("{place}[{i}]"), entry, rest, numbers)?,
                 }
             }
         }
-        other => {
+        (Value::Array(entries), _) => {
+            return Err(ragged(place, format!("a list of {}", entries.len()), shape));
+        }
+        (Value::Number(_), _) => return Err(ragged(place, "a number".to_owned(), shape)),
+        (other, _) => {
             let shown: String = other.to_string().chars().take(40).collect();
             return Err(Error::new(place, shown, "finite numbers"));
         }
     }
     Ok(())
+}
+
+/// What stands where its neighbours have something else.
+fn ragged(place: &str, problem: String, shape: &[usize]) -> Error {
+    let expected = match shape {
+        [length, ..] => format!("a list of {length}, as the first of its neighbours"),
+        [] => "a number, as the first of its neighbours".to_owned(),
+    };
+    Error::new(place, problem, expected)
 }
 
 /// `frame: 3` or `frames: [0, 1, 2]`.

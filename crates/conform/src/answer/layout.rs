@@ -1,7 +1,7 @@
 //! Arrays of an answer, whichever file they came from: which field, which poses, how wide.
 
-use super::super::Error;
 use super::super::sample::{Field, Fields, Storage};
+use super::super::{Error, Options};
 use super::{Answer, Expected, blank, finite, put};
 
 /// A named array, flat.
@@ -31,7 +31,8 @@ pub(super) fn is_field(name: &str) -> bool {
 /// An answer from its arrays; `frames` is which poses the file says that it holds.
 ///
 /// # Errors
-/// Another number of Gaussians or poses, numbers that are not finite, poses that the rig does not have.
+/// Another number of Gaussians or poses, other extents, numbers that are not finite, matrices that are not symmetric, poses that
+/// the rig does not have.
 pub(super) fn answer(
     arrays: Vec<Array>,
     frames: Option<Vec<usize>>,
@@ -88,6 +89,11 @@ fn take(answer: &mut Answer, array: Array, poses: usize, expected: &Expected) ->
         return Err(wrong_count(&array, widths[0], poses, expected));
     };
     finite(&array.name, &array.values, gaussians, width)?;
+    let given = array.values.len() / (width * gaussians);
+    shaped(&array, width, given, gaussians)?;
+    if array.name == "covariances" && width == 9 {
+        symmetric(&array, gaussians)?;
+    }
     let mut values = array.values;
     if values.len() < width * gaussians * poses {
         values = values.repeat(poses);
@@ -109,6 +115,43 @@ fn take(answer: &mut Answer, array: Array, poses: usize, expected: &Expected) ->
         }
         "covariances" => single(answer, Field::Covariances, &values),
         _ => take_sh(answer, &values, width),
+    }
+    Ok(())
+}
+
+/// Refuses extents in another order than pose, Gaussian, number: as many numbers lie elsewhere in them.
+fn shaped(array: &Array, width: usize, poses: usize, gaussians: usize) -> Result<(), Error> {
+    let mut tails = vec![vec![width]];
+    match (array.name.as_str(), width) {
+        ("opacities", _) => tails.push(Vec::new()),
+        ("covariances", 9) => tails.push(vec![3, 3]),
+        ("sh", _) => tails.push(vec![width / 3, 3]),
+        _ => {}
+    }
+    // The only pose needs no extent of its own.
+    let heads =
+        if poses == 1 { vec![vec![1, gaussians], vec![gaussians]] } else { vec![vec![poses, gaussians]] };
+    let fits = |head: &Vec<usize>| tails.iter().any(|tail| array.shape == [head.as_slice(), tail].concat());
+    if array.shape.len() < 2 || heads.iter().any(fits) {
+        return Ok(());
+    }
+    let product = |shape: &[usize]| shape.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ");
+    let tail = tails.pop().unwrap_or_default();
+    let expected = product(&[&[poses, gaussians], tail.as_slice()].concat());
+    let expected = format!("{expected} (pose, Gaussian, numbers), or one flat list");
+    Err(Error::new(&array.name, product(&array.shape), expected))
+}
+
+/// Refuses 3x3 matrices that are no covariances.
+fn symmetric(array: &Array, gaussians: usize) -> Result<(), Error> {
+    for (at, m) in array.values.chunks_exact(9).enumerate() {
+        let largest = m.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
+        let apart = |&(a, b): &(usize, usize)| (m[a] - m[b]).abs() > Options::TOLERANCE * largest;
+        if let Some((a, b)) = [(1, 3), (2, 6), (5, 7)].into_iter().find(apart) {
+            let place = format!("{}[{}][{}]", array.name, at / gaussians, at % gaussians);
+            let problem = format!("{} above the diagonal and {} below", m[a], m[b]);
+            return Err(Error::new(place, problem, "a symmetric matrix"));
+        }
     }
     Ok(())
 }

@@ -16,6 +16,7 @@ pub(super) fn write(wiring: &Wiring, rig: &Rig, i: usize, blended: &Blended, sam
     };
     let away = matrix3::add_scaled(blended.mean, -1.0, rig.eye().to_array());
     let length = matrix3::dot(away, away).sqrt();
+    let length = if wiring.direction_is_reversed { -length } else { length };
     let direction = away.map(|c| c / length);
     let turned = match wiring.direction {
         Turn::Right => rotate(rotation::conjugate(relative), direction),

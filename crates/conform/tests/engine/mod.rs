@@ -225,6 +225,7 @@ fn gaussian(inputs: &Inputs, joints: &Joints, i: usize, has: &dyn Fn(&str) -> bo
     let turn = mat(unit(relative));
     let away = sub(mean, inputs.eye);
     let length = (away[0] * away[0] + away[1] * away[1] + away[2] * away[2]).sqrt();
+    let length = if has("direction-reversed") { -length } else { length };
     let away = away.map(|c| c / length);
     let direction = if has("sh-not-turned") {
         away

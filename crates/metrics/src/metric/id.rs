@@ -79,6 +79,11 @@ impl MetricId {
         super::bend::CLASSES.iter().find(|(id, _)| *id == self.id()).map(|&(_, class)| class)
     }
 
+    /// Whether it can be +inf, as it is of identical images: only what is a logarithm of an error can, in decibels.
+    pub fn can_be_infinite(self) -> bool {
+        self.metric().unit == "dB"
+    }
+
     /// Whether each frame has a value of its own; the others are of the avatar.
     pub fn is_of_frames(self) -> bool {
         matches!(self.metric().measure, Measure::Frame { .. })
