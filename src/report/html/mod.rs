@@ -31,7 +31,12 @@ pub const BOUND: usize = 15_000_000;
 
 /// The page, as HTML.
 pub fn html(results: &Results, extras: &Extras) -> String {
-    let mut budget = Budget::new(&extras.pictures);
+    let pictures = &extras.pictures;
+    // Where not all were read, so many were as fit in the smallest size.
+    let mut budget = match pictures.stills.len() {
+        read if read < pictures.kept => Budget::smallest(pictures, read),
+        _ => Budget::new(pictures),
+    };
     let page = page(results, extras, &budget);
     let mut html = page.html();
     // Smaller pictures, then fewer, until it fits.
