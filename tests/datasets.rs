@@ -196,10 +196,17 @@ fn the_embedded_registry_names_what_is_there() {
     let registry = Registry::embedded();
     let available: Vec<&str> =
         registry.datasets.iter().filter(|d| d.is_available()).map(|d| d.id.as_str()).collect();
-    let shipped =
-        ["synthetic", "synthetic_arm", "synthetic_small", "snapshot_ava", "multiview_ben", "xhands_ava"];
+    let shipped = [
+        "synthetic",
+        "synthetic_arm",
+        "synthetic_small",
+        "synthetic_lights",
+        "snapshot_ava",
+        "multiview_ben",
+        "xhands_ava",
+    ];
     assert_eq!(available[..shipped.len()], shipped);
-    for id in &shipped[3..] {
+    for id in &shipped[4..] {
         let dataset = registry.get(id).unwrap();
         let folder = &dataset.subject_folders().unwrap()[0];
         let subject = dataset.load_subject(folder, &Options::default()).unwrap();

@@ -78,7 +78,6 @@ fn table(id: &str) -> Result<&'static str, String> {
 
 impl Trading {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
-        make_folder(&self.out)?;
         let (name, subject) = self.subject()?;
         let (subject, given) = match &self.avatar {
             Some(path) => {
@@ -87,6 +86,7 @@ impl Trading {
             }
             None => (subject, None),
         };
+        make_folder(&self.out)?;
         let watch = Watch::new(context.quiet);
         watch.start("avatar", 1);
         let stage = Stage::new(&name, &subject, given, &self.options());
