@@ -48,10 +48,10 @@ pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result
     written.map_err(|cause| Error::write(path, "file", cause))
 }
 
-/// Finds out whether [`write`] could write there, before work is done that would be lost: nothing is left behind.
+/// Finds out whether [`write()`] could write there, before work is done that would be lost: nothing is left behind.
 ///
 /// # Errors
-/// As [`write`], but for a disk that fills up.
+/// As [`write()`], but for a disk that fills up.
 pub fn check(path: &Path) -> Result<(), Error> {
     let tried = match std::fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => Err(io::Error::from(io::ErrorKind::IsADirectory)),
