@@ -115,10 +115,12 @@ pub fn read_bytes(path: &Path, field: &str, expected: &str) -> Result<Vec<u8>, E
     source::read(path).map_err(|cause| Error::read(path, field, expected, cause))
 }
 
-/// Reads a whole UTF-8 file.
+/// Reads a whole UTF-8 file, without the byte order mark that some editors put before it.
 pub fn read_text(path: &Path, field: &str, expected: &str) -> Result<String, Error> {
     let bytes = read_bytes(path, field, expected)?;
-    String::from_utf8(bytes).map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))
+    let text = String::from_utf8(bytes);
+    let text = text.map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
 /// Reads a JSON file into a type; the error names the place in the text. A byte order mark before it is skipped, as
@@ -129,6 +131,5 @@ pub fn read_json<T: serde::de::DeserializeOwned>(
     expected: &str,
 ) -> Result<T, Error> {
     let text = read_text(path, field, expected)?;
-    let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    serde_json::from_str(json).map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))
+    serde_json::from_str(&text).map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))
 }

@@ -71,8 +71,7 @@ fn text(path: &Path, field: &str) -> Result<String, Error> {
         let expected = "COLMAP's text form (colmap model_converter --output_type TXT)";
         return Err(Error::invalid(path, field, format!("only {} is here", binary.display()), expected));
     }
-    let text = error::read_text(path, field, "a text model of COLMAP")?;
-    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+    error::read_text(path, field, "a text model of COLMAP")
 }
 
 /// A camera's pinhole part and whether it is distorted.
