@@ -45,6 +45,7 @@ struct Work {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 struct Slurm {
     #[command(flatten)]
     work: Work,
@@ -66,6 +67,7 @@ struct Slurm {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 struct Array {
     #[command(flatten)]
     work: Work,

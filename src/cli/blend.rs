@@ -16,6 +16,7 @@ use std::path::PathBuf;
 /// their gap are those of the weights as given; no other answer depends on the sum. Each answer has its component of
 /// largest magnitude positive, except the raw conversion, which is as PyTorch3D returns it.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Blend {
     /// The cases
     #[arg(value_name = "CASES.json")]
@@ -62,6 +63,10 @@ struct Answer {
     /// False where the average is a choice among equals.
     unique: bool,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce blend cases.json                answers as JSON";
 
 impl Blend {
     pub(super) fn run(&self) -> Result<Exit> {

@@ -10,6 +10,7 @@ use clap::builder::{OsStringValueParser, PossibleValue, PossibleValuesParser, Ty
 use skinsplat::report::compare::{self, Changes, Fate, Tolerances, Verdict};
 use skinsplat::report::{Results, picture_name};
 use skinsplat::run::pictures::single_picture;
+use skinsplat_core::choice::one_of;
 use skinsplat_data::error::read_text;
 use skinsplat_table::{FORMATS, to_json};
 use std::collections::BTreeSet;
@@ -139,7 +140,7 @@ pub(super) fn check_tables(tables: &[String], runs: &[Results]) -> Result<()> {
     match tables.iter().find(|id| !known.contains(id.as_str())) {
         Some(id) => {
             let known: Vec<&str> = known.into_iter().collect();
-            bail!("--table {id}; expected one of {}", known.join(", "))
+            bail!("--table {id}; expected {}", one_of(id, &known))
         }
         None => Ok(()),
     }

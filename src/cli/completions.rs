@@ -7,10 +7,15 @@ use clap_complete::Shell;
 
 /// Print a completion script for a shell.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Completions {
     /// The shell.
     shell: Shell,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce completions bash > ~/.local/share/bash-completion/completions/reproduce";
 
 impl Completions {
     pub(super) fn run(&self) -> Result<Exit> {

@@ -31,6 +31,7 @@ enum Action {
 
 /// Write a test rig for engines: Gaussians, body, poses, camera, and what they should become.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 struct Export {
     /// Folder to write to; it is made if it is missing
     #[arg(long, value_name = "DIR")]
@@ -58,6 +59,7 @@ enum Size {
 ///
 /// Exit code 0 if it conforms, 1 if it differs, 2 if it cannot be read.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 struct Check {
     /// Folder that `conform export` wrote
     #[arg(value_name = "DIR")]

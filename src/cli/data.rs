@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 use skinsplat::datasets::{Dataset, Registry};
 use skinsplat::experiment::{AvatarRecipe, Experiment, Unreadable};
 use skinsplat::run::{Library, LoadedDataset, RegisteredAvatar};
+use skinsplat_core::choice::one_of;
 use skinsplat_data::folder::Options;
 use skinsplat_data::{Error, Subject};
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ const LOCAL: &str = "datasets.toml";
 const VARIABLE: &str = "REPRODUCE_DATASETS";
 
 /// Where data comes from.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Data")]
 pub(super) struct Data {
     /// Run on the subjects of this folder: a subject, a folder of subjects, or a folder with datasets/ in it
@@ -67,7 +68,7 @@ impl Data {
         }
         match found.as_slice() {
             [dataset] => Ok((dataset.id.clone(), dataset.load_one(subject, &self.options())?)),
-            [] => bail!("subject `{name}`; expected one of {}", known.join(", ")),
+            [] => bail!("subject `{name}`; expected {}", one_of(name, &known)),
             _ => bail!("subject `{name}` is in several data sets; expected DATASET/SUBJECT"),
         }
     }
@@ -86,7 +87,7 @@ impl Data {
             if let Some(subject) = subject
                 && !ids.iter().any(|id| id == subject)
             {
-                bail!("{}: no subject `{subject}`; expected one of {}", dataset.id, ids.join(", "));
+                bail!("{}: no subject `{subject}`; expected {}", dataset.id, one_of(subject, &ids));
             }
             for id in ids.iter().filter(|id| subject.is_none_or(|subject| *id == subject)) {
                 found.push((format!("{}/{id}", dataset.id), dataset.load_one(id, &self.options())));
@@ -178,7 +179,7 @@ fn wanted<'r>(registry: &'r Registry, id: Option<&str>) -> Result<Vec<&'r Datase
     };
     let Some(dataset) = registry.datasets.iter().find(|dataset| dataset.id == id) else {
         let known: Vec<&str> = registry.datasets.iter().map(|dataset| dataset.id.as_str()).collect();
-        bail!("data set `{id}`; expected one of {}", known.join(", "));
+        bail!("data set `{id}`; expected {}", one_of(id, &known));
     };
     Ok(vec![dataset])
 }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Say who has a data set, what to unpack where, and what a registry says of it.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct FetchHelp {
     /// Id of the data set (see `reproduce list datasets`)
     dataset: String,
@@ -21,6 +22,10 @@ pub(super) struct FetchHelp {
 /// Where the body models are to be had, by what a layout's files are made for.
 const MODELS: [(&str, &str); 2] =
     [("SMPL", "https://smpl.is.tue.mpg.de"), ("SMPL-X", "https://smpl-x.is.tue.mpg.de")];
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce fetch-help neuman";
 
 impl FetchHelp {
     pub(super) fn run(&self) -> Result<Exit> {

@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 /// (.npz, .pkl, .json), images, results.json and the results store of a run, parts of data sets (.npy, .tiff, .hdf5, .txt); and folders: a subject in any of the layouts that
 /// are read, folders of subjects, exports of SplattingAvatar, images that another program rendered.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Inspect {
     /// What to look at
     #[arg(value_name = "FILE")]
@@ -30,6 +31,12 @@ pub(super) struct Inspect {
     #[command(flatten)]
     motion: needs::Motion,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce inspect avatar.ply              Gaussians, binding, dialect
+  reproduce inspect data/neuman/seattle     what a data set holds and lacks
+  reproduce inspect runs/default            a run";
 
 impl Inspect {
     pub(super) fn run(&self, context: super::Context) -> Result<Exit> {
@@ -41,6 +48,7 @@ impl Inspect {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         let text = match extension.as_str() {
             _ if path.is_dir() => folder::text(path)?,
+            _ if !path.exists() => bail!("{}: not there; expected a file or folder", path.display()),
             "ply" | "pth" | "pt" | "ckpt" | "spz" | "splat" | "ksplat" | "sog" => {
                 avatar_text(&read_avatar(path)?)
             }

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// List experiments, datasets, strategies, recipes, protocols or metrics.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct List {
     /// What to list
     #[arg(value_enum)]
@@ -40,6 +41,11 @@ enum What {
     /// Metrics and their variants.
     Metrics,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce list datasets
+  reproduce list strategies --format json";
 
 impl List {
     pub(super) fn run(&self) -> Result<Exit> {

@@ -7,6 +7,7 @@ mod compare;
 mod completions;
 mod conform;
 mod data;
+mod demo;
 mod exit;
 mod export;
 mod fetch_help;
@@ -62,6 +63,7 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Demo(demo::Demo),
     Run(run::Run),
     Plan(plan::Plan),
     Merge(merge::Merge),
@@ -161,6 +163,7 @@ impl Command {
     /// How to go on after the command was stopped.
     fn advice(&self) -> String {
         match self {
+            Self::Demo(command) => command.advice(),
             Self::Run(command) => command.advice(),
             Self::Fit(command) => command.advice(),
             _ => "nothing is left half written; the same command starts anew".to_owned(),
@@ -169,6 +172,7 @@ impl Command {
 
     fn run(&self, context: Context) -> anyhow::Result<Exit> {
         match self {
+            Self::Demo(command) => command.run(context),
             Self::Run(command) => command.run(context),
             Self::Plan(command) => command.run(),
             Self::Merge(command) => command.run(context),

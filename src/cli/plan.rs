@@ -12,6 +12,7 @@ use std::path::PathBuf;
 ///
 /// Prints tables, avatars and frames, and how many of them the results store of --out has already.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Plan {
     #[command(flatten)]
     planning: Planning,
@@ -25,6 +26,12 @@ pub(super) struct Plan {
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce plan                              the six tables: rows, avatars, frames still to do
+  reproduce plan table1 --data DIR            what a folder of subjects would give
+  reproduce plan --profile paper --seeds 0,1,2";
 
 impl Plan {
     pub(super) fn run(&self) -> Result<Exit> {

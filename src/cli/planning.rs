@@ -9,6 +9,7 @@ use skinsplat::experiment::{
     self, AvatarRecipe, Experiment, GIVEN_AVATAR, GivenWeights, Options, Plan, Profile, Subset, Variant,
 };
 use skinsplat::run::{Library, RegisteredAvatar};
+use skinsplat_core::choice::one_of;
 use skinsplat_metrics::lpips::weights::Networks;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -130,16 +131,17 @@ impl Planning {
 
     fn experiments(&self) -> Result<Vec<Experiment>> {
         let known = known_experiments()?;
+        let built_in = Experiment::embedded_all();
         let mut chosen = Vec::new();
         for name in &self.experiments {
             if Path::new(name).extension().is_some_and(|e| e == "toml") {
                 chosen.push(Experiment::load(Path::new(name))?);
                 continue;
             }
-            let Some(experiment) = known.iter().find(|e| *name == *e.id) else {
+            let Some(experiment) = known.iter().chain(&built_in).find(|e| *name == *e.id) else {
                 let ids: Vec<&str> = known.iter().map(|e| e.id.as_str()).collect();
                 let name = name.to_string_lossy();
-                bail!("experiment `{name}`; expected a .toml file or one of {}", ids.join(", "));
+                bail!("experiment `{name}`; expected a .toml file or {}", one_of(&name, &ids));
             };
             chosen.push(experiment.clone());
         }
@@ -184,12 +186,13 @@ fn named<'e>(experiments: &'e mut [Experiment], id: &str, argument: &str) -> Res
     if named.is_empty() {
         let known: BTreeSet<&str> = others.iter().map(|variant| variant.id.as_str()).collect();
         let known: Vec<&str> = known.into_iter().collect();
-        bail!("{argument}: no variant `{id}`; expected one of {}", known.join(", "));
+        bail!("{argument}: no variant `{id}`; expected {}", one_of(id, &known));
     }
     Ok(named)
 }
 
-/// The experiments of `experiments/` in this folder, if there is one; else those that are built in.
+/// The experiments of `experiments/` in this folder, if there is one; else those that are built in, which can be named in any
+/// case.
 pub(super) fn known_experiments() -> Result<Vec<Experiment>> {
     let folder = PathBuf::from("experiments");
     Ok(if folder.is_dir() { Experiment::load_folder(&folder)? } else { Experiment::embedded_all() })

@@ -1,11 +1,12 @@
 //! Progress: a bar on a terminal, a line per avatar and per sequence elsewhere.
 
 use super::output::say;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use skinsplat::run::Event;
 use skinsplat_fit::train::Step;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What a single fit is called.
 const FITTING: &str = "fitting";
@@ -18,9 +19,13 @@ pub(super) struct Watch {
     lines: bool,
     /// Avatars begun.
     avatars: AtomicU64,
+    /// The avatar that is being made.
+    avatar: Mutex<String>,
+    /// The part of the work, before what is said of it.
+    part: String,
 }
 
-const TEMPLATE: &str = "{msg:>8} {bar:40} {pos}/{len}, {elapsed} gone, {eta} left{prefix}";
+const TEMPLATE: &str = "{msg:>8} {bar:32} {pos}/{len}, {elapsed} gone{left}{prefix}";
 
 impl Watch {
     /// A bar without a length; hidden if `quiet`.
@@ -30,10 +35,17 @@ impl Watch {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
         if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
-            bar.set_style(style);
+            bar.set_style(style.with_key("left", left));
         }
         let lines = !quiet && !std::io::stderr().is_terminal();
-        Self { bar, quiet, lines, avatars: AtomicU64::new(0) }
+        Self { bar, quiet, lines, avatars: AtomicU64::new(0), avatar: Mutex::default(), part: String::new() }
+    }
+
+    /// As [`Self::new`], for a part of the work, which each line names.
+    pub(super) fn of(id: &str, quiet: bool) -> Self {
+        let mut watch = Self::new(quiet);
+        watch.part = format!("{id}: ");
+        watch
     }
 
     /// Shows what happened.
@@ -43,11 +55,17 @@ impl Watch {
             Event::Frames(count) => self.start("frames", count),
             Event::Avatar(name) => {
                 let number = self.avatars.fetch_add(1, Ordering::Relaxed) + 1;
-                self.line(&format!("avatar {number}/{}: {name}", self.bar.length().unwrap_or_default()));
+                let all = self.bar.length().unwrap_or_default();
+                self.line(&format!("{}avatar {number}/{all}: {name}", self.part));
+                self.detail(format!(" | {name}"));
+                *self.avatar() = name;
             }
             Event::Fitting(step) => {
                 let Step { iteration, iterations, psnr, splats, .. } = step;
-                self.detail(format!(" | iteration {iteration}/{iterations}, {psnr:.2} dB, {splats} splats"));
+                let avatar = self.avatar().clone();
+                self.detail(format!(
+                    " | {avatar}, iteration {iteration}/{iterations}, {psnr:.2} dB, {splats} splats"
+                ));
             }
             Event::AvatarReady | Event::FrameDone => {
                 self.detail(String::new());
@@ -55,10 +73,14 @@ impl Watch {
             }
             Event::SequenceDone(name, frames) => {
                 let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
-                self.line(&format!("sequence {name}: {frames} frames; {done} of {all} in all"));
+                self.line(&format!("{}sequence {name}: {frames} frames; {done} of {all} in all", self.part));
             }
             Event::Warning(text) => self.above(&format!("warning: {text}"), self.quiet),
         }
+    }
+
+    fn avatar(&self) -> MutexGuard<'_, String> {
+        self.avatar.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// A line, where there is no bar.
@@ -96,11 +118,19 @@ impl Watch {
     }
 
     /// A bar of so many steps begins.
-    pub(super) fn start(&self, what: &'static str, count: usize) {
-        self.bar.set_message(what);
+    pub(super) fn start(&self, what: &str, count: usize) {
+        self.bar.set_message(format!("{}{what}", self.part));
         self.bar.set_length(count as u64);
         self.bar.set_position(0);
         self.bar.reset_eta();
+    }
+}
+
+/// How much longer it will take, once there is something to tell it from.
+fn left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
+    if state.pos() > 0 {
+        // Nobody can be told of an error here.
+        let _ = write!(out, ", about {:#} left", HumanDuration(state.eta()));
     }
 }
 

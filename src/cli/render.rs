@@ -13,6 +13,7 @@ use std::path::PathBuf;
 /// world_to_camera (4x4, rows, OpenCV axes) and, if you like, background; cameras.npz, cameras.json of 3DGS training and
 /// transforms.json of nerfstudio are read as well.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Render {
     /// The avatar or scene, whoever made it
     #[arg(value_name = "FILE")]
@@ -35,6 +36,11 @@ pub(super) struct Render {
     #[command(flatten)]
     posing: Posing,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce render avatar.ply --camera camera.json --out picture.png
+  reproduce render avatar.ply --camera cameras.npz --camera-index 3 --body body.npz --poses poses.npz --frame 12 --out posed.png";
 
 impl Render {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {

@@ -17,6 +17,7 @@ use std::path::PathBuf;
 ///
 /// With --baseline it is `reproduce compare BASELINE RUN`, with the same exit codes.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Report {
     /// Folder of a run, or its results.json
     #[arg(value_name = "RUN", default_value = super::run::DEFAULT_OUT)]
@@ -42,6 +43,13 @@ pub(super) struct Report {
     #[command(flatten)]
     comparing: Comparing,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce report runs/default                                tables of a run as Markdown
+  reproduce report runs/default --format latex --table table3
+  reproduce report runs/default --format html --out page.html  a page with charts and pictures
+  reproduce report runs/default --timing                       where the time went";
 
 impl Report {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {

@@ -6,8 +6,8 @@ use super::planning::{Planned, Planning};
 use super::products::{AVATARS, make_folder, verdict, write_bend, write_curves, write_results, write_text};
 use super::{Context, Exit, progress::Watch};
 use anyhow::{Context as _, Result};
-use skinsplat::experiment::{Records, Shard, Unreadable};
-use skinsplat::report;
+use skinsplat::experiment::{Job, Records, Shard, Unreadable};
+use skinsplat::report::{self, Results};
 use skinsplat::run::motion::{self, Motion};
 use skinsplat::run::pictures;
 use skinsplat::run::plan_file::{LeftOut, PlanFile};
@@ -105,7 +105,11 @@ impl Run {
 
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let start = Instant::now();
-        self.html.iter().try_for_each(|path| atomic::check(path))?;
+        // The folder itself is made once there is a plan.
+        self.html
+            .iter()
+            .filter(|path| !path.starts_with(&self.out))
+            .try_for_each(|path| atomic::check(path))?;
         let mut planned = self.planning.plan()?;
         let motion = self.motion(&mut planned, context)?;
         let mut provenance = Provenance::starting(&planned.plan);
@@ -117,39 +121,62 @@ impl Run {
                 std::fs::remove_file(&path).with_context(|| format!("{}: cannot remove", path.display()))?;
             }
         }
-        provenance.frames_rendered = self.execute(&planned, &stopwatch, context)?;
+        let (rendered, results) = self.execute(&planned, &stopwatch, context)?;
+        provenance.frames_rendered = rendered;
         provenance.phases = stopwatch.phases();
         provenance.frames_planned = planned.plan.jobs.len();
         provenance.seconds = start.elapsed().as_secs_f64();
-        if self.shard.is_some() {
-            return self.verdict_of_shard(&planned, context);
+        match results {
+            Some(results) => self.write(&planned, &results, motion.as_ref(), &provenance, context),
+            None => self.verdict_of_shard(&planned, context),
         }
-        self.write(&planned, motion.as_ref(), &provenance, context)
     }
 
-    /// Renders what is left to do; says how many frames that were.
-    fn execute(&self, planned: &Planned, stopwatch: &Stopwatch, context: Context) -> Result<usize> {
-        let Planned { plan, library, networks, .. } = planned;
-        let known = store::merge(store::stores(&self.out)?.iter().map(PathBuf::as_path))?;
-        let left = store::outstanding(&plan.shard(self.shard), &known);
+    /// Renders what is left to do, table by table, and prints each as soon as it is done; a slice prints none. Says how many
+    /// frames were rendered.
+    fn execute(
+        &self,
+        planned: &Planned,
+        stopwatch: &Stopwatch,
+        context: Context,
+    ) -> Result<(usize, Option<Results>)> {
+        let Planned { plan, library, networks, experiments, .. } = planned;
+        let left = store::outstanding(&plan.shard(self.shard), &self.records()?);
+        run::check(&left, library)?;
         if self.shard.is_some() {
-            PlanFile::new(plan, &planned.experiments, left_out(planned)).write(&self.out)?;
+            PlanFile::new(plan, experiments, left_out(planned)).write(&self.out)?;
+        } else {
+            emit(&report::head(&report::results(plan, experiments, &Records::default())?))?;
         }
         let path = self.out.join(self.store_name());
         let mut store = Store::open(&path, &plan.digest, &Machine::here())?;
-        let watch = Watch::new(context.quiet);
         let avatars = self.out.join(AVATARS);
-        run::execute(plan, &left, library, networks, &avatars, &mut store, &|event| {
-            stopwatch.see(&event);
-            watch.see(event);
-        })?;
-        Ok(left.len())
+        let mut tables = Vec::new();
+        for (index, table) in plan.tables.iter().enumerate() {
+            let jobs: Vec<Job> = left.iter().filter(|job| job.table == index).cloned().collect();
+            let watch = Watch::of(&table.experiment, context.quiet);
+            run::execute(plan, &jobs, library, networks, &avatars, &mut store, &|event| {
+                stopwatch.see(&event);
+                watch.see(event);
+            })?;
+            drop(watch);
+            if self.shard.is_none() {
+                let results = report::table_results(plan, index, experiments, &self.records()?)?;
+                emit(&format!("\n{}", report::markdown(&results)))?;
+                tables.push(results);
+            }
+        }
+        Ok((left.len(), self.shard.is_none().then(|| report::results_of(plan, tables))))
+    }
+
+    /// What is known of the folder's frames.
+    fn records(&self) -> Result<Records> {
+        Ok(store::merge(store::stores(&self.out)?.iter().map(PathBuf::as_path))?)
     }
 
     /// Whether every frame of the slice has a score.
     fn verdict_of_shard(&self, Planned { plan, .. }: &Planned, context: Context) -> Result<Exit> {
-        let known = store::merge(store::stores(&self.out)?.iter().map(PathBuf::as_path))?;
-        let left = store::outstanding(&plan.shard(self.shard), &known);
+        let left = store::outstanding(&plan.shard(self.shard), &self.records()?);
         let missing: usize = left.iter().map(|job| job.variants.len()).sum();
         if missing == 0 {
             return Ok(Exit::Success);
@@ -164,28 +191,28 @@ impl Run {
         self.shard.map_or_else(|| FILE_NAME.to_owned(), Shard::file_name)
     }
 
-    /// The tables, from every record in the folder.
+    /// The files of the tables, and what goes with them.
     fn write(
         &self,
         planned: &Planned,
+        results: &Results,
         motion: Option<&Motion>,
         provenance: &Provenance,
         context: Context,
     ) -> Result<Exit> {
-        let records: Records = store::merge(store::stores(&self.out)?.iter().map(PathBuf::as_path))?;
-        let results = report::results(&planned.plan, &planned.experiments, &records)?;
-        write_results(&self.out, &results)?;
+        let records = self.records()?;
+        write_results(&self.out, results)?;
         write_curves(&self.out, &planned.plan, &planned.experiments, std::slice::from_ref(&self.out))?;
-        write_bend(&self.out, &results)?;
+        write_bend(&self.out, results)?;
         write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
         if self.images.is_some_and(|which| which != Images::None) {
             self.write_images(planned, &records, context)?;
         }
-        self.write_page(planned, &records, &results, context)?;
+        self.write_page(planned, &records, results, context)?;
         if let Some(motion) = motion {
             self.write_motion(planned, motion, context)?;
         }
-        emit(&report::page(&results))?;
+        emit(&report::incomplete(results))?;
         let out = self.out.display();
         context.note(format!("{out}: tables.md, results.json and more, in {:.1} s", provenance.seconds));
         let missing = results.missing();
@@ -218,12 +245,12 @@ impl Run {
         &self,
         Planned { plan, library, .. }: &Planned,
         records: &Records,
-        results: &report::Results,
+        results: &Results,
         context: Context,
     ) -> Result<()> {
         let images = self.images.unwrap_or(if self.html.is_some() { Images::Key } else { Images::None });
         if images != Images::None {
-            let watch = Watch::new(context.quiet);
+            let watch = Watch::of("pictures", context.quiet);
             let (avatars, folder) = (self.out.join(AVATARS), self.out.join(PICTURES));
             pictures::write(plan, library, records, images.keep(), &avatars, &folder, &|event| {
                 watch.see(event)
@@ -241,7 +268,7 @@ impl Run {
         motion: &Motion,
         context: Context,
     ) -> Result<()> {
-        let watch = Watch::new(context.quiet);
+        let watch = Watch::of("motion", context.quiet);
         let (avatars, folder) = (self.out.join(AVATARS), self.out.join("motion"));
         Ok(motion::write(plan, library, motion, &avatars, &folder, &|event| watch.see(event))?)
     }
@@ -252,7 +279,7 @@ impl Run {
         records: &Records,
         context: Context,
     ) -> Result<()> {
-        let watch = Watch::new(context.quiet);
+        let watch = Watch::of("images", context.quiet);
         let folder = self.out.join("images");
         let avatars = self.out.join(AVATARS);
         let page = gallery::write(plan, library, records, &avatars, &folder, &|event| watch.see(event))?;

@@ -12,6 +12,7 @@ use std::path::PathBuf;
 ///
 /// Quaternions and SH are rotated, so any rasterizer draws the posed avatar: none needs to change.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Skin {
     /// The canonical avatar, whoever made it
     #[arg(value_name = "AVATAR")]
@@ -34,6 +35,11 @@ enum Continuity {
     /// The rest pose of the parent joint, without a memory: the strategy axis rotation=lifted-sum
     Rest,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce skin avatar.ply --body body.npz --poses poses.npz --frame 12 --out posed.ply
+  reproduce skin avatar.ply --body rig.glb --poses rig.glb --clip Walk --strategy lbs --out posed.ply";
 
 impl Skin {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 /// Needs no data. Writes stress.md, stress.html, stress.csv (a line per input), stress.json and pictures of what breaks visibly, and
 /// prints the Markdown.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Stress {
     /// Folder to write to; it is made if it is missing
     #[arg(long, value_name = "DIR", default_value = "runs/stress")]
@@ -41,6 +42,11 @@ impl std::str::FromStr for SectionName {
         section.map(Self).ok_or_else(|| format!("expected one of {}", known()))
     }
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce stress                          everything, into runs/stress
+  reproduce stress --only averages --out /tmp/stress";
 
 impl Stress {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {

@@ -3,6 +3,7 @@
 mod load;
 
 use serde::{Deserialize, Serialize};
+use skinsplat_core::choice::one_of;
 use skinsplat_data::folder::{self, Options, Subject};
 use skinsplat_data::layouts::{LAYOUTS, Layout, Request, Split};
 use skinsplat_data::{Capture, Error, error};
@@ -130,12 +131,7 @@ impl Registry {
     pub fn get(&self, id: &str) -> Result<&Dataset, Error> {
         self.datasets.iter().find(|d| d.id == id).ok_or_else(|| {
             let ids: Vec<&str> = self.datasets.iter().map(|d| d.id.as_str()).collect();
-            Error::invalid(
-                &self.path,
-                "dataset",
-                format!("no id {id:?}"),
-                format!("one of: {}", ids.join(", ")),
-            )
+            Error::invalid(&self.path, "dataset", format!("no id {id:?}"), one_of(id, &ids))
         })
     }
 

@@ -25,6 +25,7 @@ pub const FURTHER: &[(&str, &str)] = &[
     ("experiments/bend.toml", include_str!("../../experiments/bend.toml")),
     ("experiments/budget.toml", include_str!("../../experiments/budget.toml")),
     ("experiments/ci.toml", include_str!("../../experiments/ci.toml")),
+    ("experiments/demo.toml", include_str!("../../experiments/demo.toml")),
     ("experiments/engines.toml", include_str!("../../experiments/engines.toml")),
     ("experiments/lights.toml", include_str!("../../experiments/lights.toml")),
     ("experiments/noise.toml", include_str!("../../experiments/noise.toml")),

@@ -8,6 +8,7 @@ use super::{
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::json;
+use skinsplat_core::choice::one_of;
 use skinsplat_data::key::content_key;
 use skinsplat_fit::options::PoseFit;
 use skinsplat_metrics::{MetricId, Protocol, ProtocolId};
@@ -411,7 +412,7 @@ fn subset_names_something(
                 return Err(Error::invalid("subset", key, problem, "a subject that can be loaded"));
             }
             let known: Vec<&str> = known.into_iter().collect();
-            let expected = format!("one of {}", known.join(", "));
+            let expected = one_of(stranger, &known);
             return Err(Error::invalid("subset", key, format!("`{stranger}`"), expected));
         }
     }

@@ -15,21 +15,38 @@ use skinsplat_metrics::{FrameScore, Protocol};
 /// # Errors
 /// If the plan is not of these experiments, or a record's score is of another protocol than its key says.
 pub fn results(plan: &Plan, experiments: &[Experiment], records: &Records) -> Result<Results, Error> {
-    let tables = plan.tables.iter().enumerate().map(|(index, planned)| {
-        let experiment = experiments
-            .iter()
-            .find(|experiment| experiment.id == planned.experiment)
-            .ok_or_else(|| Error::Unplanned { experiment: planned.experiment.clone() })?;
-        let jobs: Vec<&Job> = plan.jobs.iter().filter(|job| job.table == index).collect();
-        table(plan, planned, experiment, &jobs, records)
-    });
-    Ok(Results {
+    let tables = (0..plan.tables.len()).map(|index| table_results(plan, index, experiments, records));
+    Ok(results_of(plan, tables.collect::<Result<_, _>>()?))
+}
+
+/// The results of a plan whose tables are these.
+pub fn results_of(plan: &Plan, tables: Vec<TableResults>) -> Results {
+    Results {
         schema: SCHEMA,
         plan: plan.digest.clone(),
         options: plan.options.clone(),
         code: CodeVersions::CURRENT,
-        tables: tables.collect::<Result<_, _>>()?,
-    })
+        tables,
+    }
+}
+
+/// One table of a plan, of which only its own records have to be there.
+///
+/// # Errors
+/// As [`results`].
+pub fn table_results(
+    plan: &Plan,
+    index: usize,
+    experiments: &[Experiment],
+    records: &Records,
+) -> Result<TableResults, Error> {
+    let planned = &plan.tables[index];
+    let experiment = experiments
+        .iter()
+        .find(|experiment| experiment.id == planned.experiment)
+        .ok_or_else(|| Error::Unplanned { experiment: planned.experiment.clone() })?;
+    let jobs: Vec<&Job> = plan.jobs.iter().filter(|job| job.table == index).collect();
+    table(plan, planned, experiment, &jobs, records)
 }
 
 fn table(

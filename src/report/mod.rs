@@ -31,11 +31,11 @@ pub mod timing;
 
 pub use crate::run::gallery::picture_name;
 pub use bend::{bend_csv, bend_plots};
-pub use collect::results;
+pub use collect::{results, results_of, table_results};
 pub use comparison::{Comparison, MetricDifference};
 pub use curves::{curve_plots, curves_csv};
 pub use markdown::markdown;
-pub use page::page;
+pub use page::{head, incomplete, page};
 pub use results::{
     DataDigests, FrameResult, OLDEST_SCHEMA, Results, SCHEMA, SequenceResults, TableResults, VariantResults,
 };

@@ -7,30 +7,39 @@ use std::collections::BTreeSet;
 
 /// The page: how it was made, what is missing, and the tables.
 pub fn page(results: &Results) -> String {
-    let mut text = format!(
-        "# Results\n\nMade by `{}`, on the data that the tables name (experiment files and a data folder are further \
-         arguments). Nothing on this page depends on the time or the machine. Bold is the best value of a \
-         sequence, with everything that the frames do not decide to be worse: where they are too few to decide anything, all of \
-         it. Counts are bold only where they are what the table is about. ↑: more is better, ↓: less is better; \
-         n/c: not computed.\n\n",
-        command(results)
-    );
-    let code = results.code;
-    text += &format!(
-        "Plan `{}`; code versions: fit {}, strategy {}, render {}, metrics {}.\n",
-        results.plan, code.fit, code.strategy, code.render, code.metrics
-    );
-    match results.missing() {
-        0 => {}
-        missing => {
-            text += &format!("\n**Incomplete: {} missing; see the footnotes.**\n", count(missing, "score"))
-        }
-    }
+    let mut text = head(results) + &incomplete(results);
     for table in &results.tables {
         text.push('\n');
         text += &markdown(table);
     }
     text
+}
+
+/// How the tables were made and are read: the same for any records.
+pub fn head(results: &Results) -> String {
+    let code = results.code;
+    format!(
+        "# Results\n\nMade by `{}`, on the data that the tables name (experiment files and a data folder are further \
+         arguments). Nothing on this page depends on the time or the machine. Bold is the best value of a \
+         sequence, with everything that the frames do not decide to be worse: where they are too few to decide anything, all of \
+         it. Counts are bold only where they are what the table is about. ↑: more is better, ↓: less is better; \
+         n/c: not computed.\n\n\
+         Plan `{}`; code versions: fit {}, strategy {}, render {}, metrics {}.\n",
+        command(results),
+        results.plan,
+        code.fit,
+        code.strategy,
+        code.render,
+        code.metrics
+    )
+}
+
+/// How many scores are missing, if any are.
+pub fn incomplete(results: &Results) -> String {
+    match results.missing() {
+        0 => String::new(),
+        missing => format!("\n**Incomplete: {} missing; see the footnotes.**\n", count(missing, "score")),
+    }
 }
 
 /// The argument that gave a variant its avatar; the captions say which file that was.

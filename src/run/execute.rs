@@ -52,13 +52,7 @@ pub fn execute(
     store: &mut Store,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<(), Error> {
-    for job in jobs {
-        let sequence = library.sequence(&job.dataset, &job.subject, &job.sequence)?;
-        sequence
-            .frames
-            .get(job.frame)
-            .map_or(Ok(()), |frame| check_background(&job.protocol, &frame.source))?;
-    }
+    check(jobs, library)?;
     let avatars = prepare_avatars(plan, jobs, library, folder, watch)?;
     watch(Event::Frames(jobs.len()));
     let state = Mutex::new((store, Left::of(jobs)));
@@ -72,6 +66,18 @@ pub fn execute(
             left.done(job, watch);
         }
         Ok::<(), Error>(())
+    })
+}
+
+/// Whether the data have what the jobs' protocols need: known before anything is made.
+///
+/// # Errors
+/// A protocol that needs what the data does not have.
+pub fn check(jobs: &[Job], library: &Library) -> Result<(), Error> {
+    jobs.iter().try_for_each(|job| {
+        let sequence = library.sequence(&job.dataset, &job.subject, &job.sequence)?;
+        let frame = sequence.frames.get(job.frame);
+        frame.map_or(Ok(()), |frame| check_background(&job.protocol, &frame.source))
     })
 }
 

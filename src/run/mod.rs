@@ -35,6 +35,6 @@ pub mod store;
 pub mod textured;
 
 pub use error::Error;
-pub use execute::{Event, execute};
+pub use execute::{Event, check, execute};
 pub use library::{Library, LoadedDataset, RegisteredAvatar};
 pub use machine::Machine;

@@ -66,6 +66,8 @@ pub struct Stopwatch(Mutex<Laps>);
 struct Laps {
     since: Instant,
     avatar: Option<String>,
+    /// Seconds of the frames of tables that are done.
+    frames: f64,
     phases: Phases,
 }
 
@@ -73,7 +75,7 @@ impl Stopwatch {
     /// Running, after a plan that took so many seconds.
     pub fn after_planning(seconds: f64) -> Self {
         let phases = Phases { plan: seconds, ..Phases::default() };
-        Self(Mutex::new(Laps { since: Instant::now(), avatar: None, phases }))
+        Self(Mutex::new(Laps { since: Instant::now(), avatar: None, frames: 0.0, phases }))
     }
 
     /// Sees an event of the run.
@@ -90,8 +92,11 @@ impl Stopwatch {
                     laps.phases.avatars.push((label, seconds));
                 }
             }
-            Event::Frames(_) => laps.since = Instant::now(),
-            Event::FrameDone => laps.phases.frames = laps.since.elapsed().as_secs_f64(),
+            Event::Frames(_) => {
+                laps.since = Instant::now();
+                laps.frames = laps.phases.frames;
+            }
+            Event::FrameDone => laps.phases.frames = laps.frames + laps.since.elapsed().as_secs_f64(),
             _ => {}
         }
     }

@@ -20,6 +20,7 @@ mod bodies_of_tables;
 mod catalogues;
 mod comparing;
 mod conforming;
+mod first_minutes;
 mod fitting;
 mod foreign_avatars;
 mod foreign_bodies;

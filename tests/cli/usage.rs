@@ -2,9 +2,14 @@
 
 use crate::args;
 use crate::program::Desk;
+use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::process::{Command, Stdio};
 
-const SUBCOMMANDS: [&str; 19] = [
+const SUBCOMMANDS: [&str; 22] = [
+    "demo",
+    "check",
+    "fetch-help",
     "run",
     "merge",
     "batch",
@@ -34,6 +39,8 @@ fn top_level_help() {
     Usage: reproduce [OPTIONS] <COMMAND>
 
     Commands:
+      demo         See what the program does, in half a minute: one subject, two rotations, a small
+                   table and pictures
       run          Evaluate: make avatars, pose, render, score, and write the tables
       plan         Show what a run would do, without doing it
       merge        Collect the slices of a run: the same tables as one run, byte for byte
@@ -89,8 +96,65 @@ fn every_subcommand_has_help_with_every_option_explained() {
         }
         assert_eq!(desk.ok(args!["help", subcommand]), help);
     }
-    assert!(desk.ok(args!["--help"]).contains("Exit codes:"));
+    let top = desk.ok(args!["--help"]);
+    assert!(top.contains("Exit codes:"));
+    let listed =
+        top.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let listed: BTreeSet<&str> = listed
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .collect();
+    assert_eq!(listed, BTreeSet::from(SUBCOMMANDS));
     assert_eq!(desk.ok(args!["--version"]), format!("reproduce {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn every_command_shows_examples() {
+    let desk = Desk::new();
+    let nested = [["batch", "slurm"], ["batch", "array"], ["conform", "export"], ["conform", "check"]];
+    let all = SUBCOMMANDS.iter().map(|name| vec![*name]).chain(nested.map(Vec::from));
+    for words in all {
+        let help = desk.ok([args![], words.iter().map(OsString::from).collect(), args!["--help"]].concat());
+        let command = format!("\n  reproduce {}", words[0]);
+        let examples = help.split_once("Examples:").map(|(_, text)| text).unwrap_or_default();
+        assert!(examples.contains(&command), "{words:?}: {help}");
+    }
+}
+
+#[test]
+fn a_slip_of_the_pen_is_told_what_was_meant() {
+    let desk = Desk::new();
+    let fit = |subject: &str, recipe: &str| args!["fit", subject, "--recipe", recipe, "--out", "a.ply"];
+    for (arguments, meant) in [
+        (args!["rum"], "run"),
+        (args!["run", "tabel1"], "`table1`"),
+        (args!["run", "table1", "--subjekt", "dots"], "'--subject'"),
+        (args!["run", "table1", "--subject", "dotz"], "`dots`"),
+        (args!["run", "table1", "--variant", "skined"], "`skinned`"),
+        (fit("ring_stripe", "haha"), "`synthetic/ring_stripes`"),
+        (fit("dots", "hugs-skined"), "`hugs-skinned`"),
+        (args!["check", "synthetik"], "`synthetic`"),
+        (args!["fetch-help", "neumann"], "`neuman`"),
+        (args!["score", "a", "b", "--protocol", "hugs-humans"], "`hugs-human`"),
+        (args!["skin", "a", "--strategy", "quaternion-averag", "--out", "b"], "`quaternion-average`"),
+    ] {
+        let what = format!("{arguments:?}");
+        desk.run(arguments).refuses(&[meant], &what);
+    }
+    desk.run(args!["run", "breakfast"]).refuses(&["expected a .toml file or one of", "table6"], "a stranger");
+    assert!(!desk.run(args!["run", "breakfast"]).err.contains("meant"));
+}
+
+#[test]
+fn colours_obey_the_environment() {
+    let desk = Desk::new();
+    let help = |variable: &str| {
+        let output = desk.command(args!["--help"]).env(variable, "1").output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    assert!(help("CLICOLOR_FORCE").contains('\u{1b}'), "colours can be had");
+    assert!(!help("NO_COLOR").contains('\u{1b}'));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::planes::floor;
 use super::{LpipsVariant, MetricsError, PsnrVariant, Region, SsimVariant};
 use crate::Aggregation;
 use serde::{Deserialize, Serialize};
+use skinsplat_core::choice::one_of;
 use std::sync::LazyLock;
 
 /// What a straight truth is composited over; the render must have been drawn over the same.
@@ -143,7 +144,7 @@ impl Protocol {
         let preset = parts.next().unwrap_or_default();
         let base = Self::preset(preset).ok_or_else(|| {
             let ids: Vec<&str> = PROTOCOLS.iter().map(|protocol| protocol.id.as_str()).collect();
-            error(format!("no preset \"{preset}\""), &ids.join(", "))
+            error(format!("no preset \"{preset}\""), &one_of(preset, &ids))
         })?;
         let mut table = toml::Table::try_from(base).map_err(|e| error(e.to_string(), "a protocol"))?;
         let mut varied = false;

@@ -1,5 +1,6 @@
 //! What can be wrong when an avatar is bound or posed.
 
+use skinsplat_core::choice::one_of;
 use skinsplat_core::scene::SceneError;
 use std::fmt;
 
@@ -49,7 +50,8 @@ impl fmt::Display for PosingError {
                 write!(f, "body: {found}; expected {expected} as in the body that the avatar was bound to")
             }
             Self::UnknownId { axis, id, expected } => {
-                write!(f, "{axis}: unknown {id:?}; expected one of {expected}")
+                let known: Vec<&str> = expected.split(", ").collect();
+                write!(f, "{axis}: unknown {id:?}; expected {}", one_of(id, &known))
             }
             Self::BadVariation { part, expected } => write!(f, "strategy: {part:?}; expected {expected}"),
         }

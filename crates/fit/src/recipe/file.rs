@@ -2,6 +2,7 @@
 
 use super::Recipe;
 use crate::Error;
+use skinsplat_core::choice::one_of;
 use std::sync::LazyLock;
 use toml::{Table, Value};
 
@@ -54,9 +55,9 @@ pub(super) fn parse(specification: &str) -> Result<Recipe, Error> {
     let parts = parts(specification);
     let mut parts = parts.iter().map(|part| part.trim());
     let id = parts.next().unwrap_or_default();
-    let known = || RECIPES.iter().map(|recipe| recipe.id.as_str()).collect::<Vec<_>>().join(", ");
+    let known: Vec<&str> = RECIPES.iter().map(|recipe| recipe.id.as_str()).collect();
     let base = RECIPES.iter().find(|recipe| recipe.id == id);
-    let base = base.ok_or_else(|| refuse(format!("no recipe `{id}`"), format!("one of {}", known())))?;
+    let base = base.ok_or_else(|| refuse(format!("no recipe `{id}`"), one_of(id, &known)))?;
     let mut table = Table::try_from(base).map_err(|e| refuse(e.to_string(), "a recipe".into()))?;
     // What recipes leave out where nothing is special about it can be varied all the same.
     let complete =

@@ -1,0 +1,66 @@
+//! `reproduce demo`: what the program does, before anything is set up.
+
+use super::data::Data;
+use super::run::Run;
+use super::{Context, Exit};
+use anyhow::Result;
+use clap::Parser;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// See what the program does, in half a minute: one subject, two rotations, a small table and pictures.
+///
+/// Fits an avatar twice, once under each rotation, draws test poses with both, scores them, and writes a page with pictures.
+/// Takes the Blender renders of the repository where its datasets.toml is, else a figure that is generated.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Demo {
+    /// Folder to write to
+    #[arg(long, value_name = "DIR", default_value = "runs/demo")]
+    out: PathBuf,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  reproduce demo
+  reproduce demo --out /tmp/demo";
+
+/// The data set of Blender renders, and a figure for where it is not.
+const RENDERED: &str = "snapshot_ava";
+const GENERATED: &str = "ring_stripes";
+
+/// The run that a demo is.
+#[derive(Debug, Parser)]
+struct Command {
+    #[command(flatten)]
+    run: Run,
+}
+
+impl Demo {
+    /// How to go on after the demo was stopped.
+    pub(super) fn advice(&self) -> String {
+        format!("what is done is kept in {}; the same command goes on from there", self.out.display())
+    }
+
+    pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        let rendered =
+            Data::default().registry()?.datasets.iter().any(|d| d.id == RENDERED && d.is_available());
+        let page = self.out.join("demo.html");
+        let words =
+            ["demo", "--subject", if rendered { RENDERED } else { GENERATED }, "--limit", "3", "--images"];
+        let mut arguments: Vec<OsString> = words.map(OsString::from).into();
+        for (option, path) in [("--html", &page), ("--out", &self.out)] {
+            arguments.extend([option.into(), path.into()]);
+        }
+        let shown: Vec<_> = arguments.iter().map(|word| word.to_string_lossy()).collect();
+        context.note(format!("reproduce run {}", shown.join(" ")));
+        let command = Command::try_parse_from(std::iter::once("reproduce run".into()).chain(arguments))?;
+        let exit = command.run.run(context)?;
+        let (out, page) = (self.out.display(), page.display());
+        context.note(format!(
+            "pictures: {page} in a browser, or {out}/images. Next: `reproduce run` for the tables of the paper, `reproduce \
+             list experiments` for others, `reproduce score RENDERS TRUTHS` for images of your own"
+        ));
+        Ok(exit)
+    }
+}

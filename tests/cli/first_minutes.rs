@@ -1,0 +1,37 @@
+//! The first things that a new user does.
+
+use crate::args;
+use crate::program::Desk;
+
+#[test]
+fn a_demo_shows_a_table_and_pictures() {
+    let desk = Desk::new();
+    let answer = desk.run(args!["demo", "--out", "seen"]).exits(0, "a demo");
+    assert!(
+        answer.out.contains("## Demo") && answer.out.contains("| PSNR ↑ | SSIM ↑ | LPIPS ↓ |"),
+        "{}",
+        answer.out
+    );
+    assert_eq!(answer.out, desk.read("seen/tables.md"));
+    assert!(desk.read("seen/demo.html").contains("data:image/"));
+    assert!(desk.path("seen/images/README.md").is_file());
+    assert!(answer.err.contains("seen/demo.html in a browser"), "{}", answer.err);
+    // What it says of itself is the command that it was.
+    let command = answer.err.lines().find_map(|line| line.strip_prefix("reproduce run ")).unwrap();
+    let words = args!["run"].into_iter().chain(command.split(' ').map(Into::into)).collect();
+    assert_eq!(desk.run(words).exits(0, command).out, answer.out);
+}
+
+/// The tables are printed as they are done, and are those of the file.
+#[test]
+fn every_table_is_printed_when_it_is_done() {
+    let desk = Desk::new();
+    let tiny = |id: &str| include_str!("tiny.toml").replace("id = \"tiny\"", &format!("id = \"{id}\""));
+    desk.put("b.toml", tiny("b"));
+    desk.put("a.toml", tiny("a").replace("sh_degree = 1", "sh_degree = 0"));
+    let run =
+        desk.run(args!["run", "b.toml", "a.toml", "--limit", "1", "--out", "run"]).exits(0, "two tables");
+    assert_eq!(run.out, desk.read("run/tables.md"));
+    let at = |line: &str| run.err.find(line).unwrap_or_else(|| panic!("{line}: {}", run.err));
+    assert!(at("b: avatar 1/1") < at("b: sequence") && at("b: sequence") < at("a: avatar 1/1"));
+}
