@@ -1,6 +1,7 @@
 //! `reproduce demo`: what the program does, before anything is set up.
 
 use super::data::Data;
+use super::quoting::quoted;
 use super::run::Run;
 use super::{Context, Exit};
 use anyhow::Result;
@@ -52,7 +53,7 @@ impl Demo {
         for (option, path) in [("--html", &page), ("--out", &self.out)] {
             arguments.extend([option.into(), path.into()]);
         }
-        let shown: Vec<_> = arguments.iter().map(|word| word.to_string_lossy()).collect();
+        let shown: Vec<String> = arguments.iter().map(|word| quoted(word)).collect();
         context.note(format!("reproduce run {}", shown.join(" ")));
         let command = Command::try_parse_from(std::iter::once("reproduce run".into()).chain(arguments))?;
         let exit = command.run.run(context)?;

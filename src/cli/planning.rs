@@ -95,7 +95,7 @@ impl Planning {
         let lpips_weights = networks.given().map(given);
         let options = Options { profile: self.profile(), subset, lpips_weights, seeds: self.seeds.clone() };
         let described = library.describe()?;
-        renders_were_found(&described)?;
+        renders_were_found(&described, &self.subjects)?;
         let plan = experiment::plan(&experiments, &described, &options)?;
         Ok(Planned { plan, experiments, library, networks })
     }
@@ -153,13 +153,15 @@ impl Planning {
     }
 }
 
-/// A folder in which no frame of any sequence was found is a mistake; gaps are named by the tables.
-fn renders_were_found(datasets: &[experiment::Dataset]) -> Result<()> {
+/// A folder in which no frame of any sequence (of the subjects asked for; all if none is) was found is a mistake; gaps are
+/// named by the tables.
+fn renders_were_found(datasets: &[experiment::Dataset], asked: &[String]) -> Result<()> {
     // One subject may be there on several bodies: the same frames.
     let frames = |renders: &experiment::RenderedFrames| (renders.folder.clone(), renders.sequence.clone());
     let mut seen = BTreeSet::new();
     let all: Vec<_> = (datasets.iter().flat_map(|d| d.subjects.iter().map(move |s| (d.registered_id(), s))))
         .flat_map(|(id, subject)| subject.renders.iter().map(move |renders| (id, subject, renders)))
+        .filter(|(_, subject, _)| asked.is_empty() || asked.contains(&subject.id))
         .filter(|(id, subject, renders)| seen.insert((*id, &subject.id, frames(renders))))
         .map(|(.., renders)| renders)
         .collect();

@@ -232,13 +232,32 @@ impl Builder<'_> {
         }
         Ok(PlannedTable {
             data_notes,
-            remarks: Vec::new(),
+            remarks: self.reduced_below_avatars(&variants, &rows).into_iter().collect(),
             experiment: experiment.id.clone(),
             source,
             datasets,
             rows,
             variants: variants.iter().map(|(_, variant)| variant.id.clone()).collect(),
             protocol: protocol.key(),
+        })
+    }
+
+    /// Avatars from files that meet smaller images than the data has: they were fitted to other ones, and splats that are
+    /// right for those are too small or too wide here.
+    fn reduced_below_avatars(&self, variants: &[(usize, &Variant)], rows: &[DataRow]) -> Option<String> {
+        let resolution = self.options.profile.resolution?;
+        let from_file =
+            |(_, variant): &(usize, &Variant)| matches!(variant.avatar, super::AvatarRecipe::File { .. });
+        let larger = |row: &DataRow| {
+            let images = self.subject(row).sequences.iter().filter_map(|sequence| sequence.image);
+            images.flatten().any(|side| side > resolution)
+        };
+        let reduced = rows.iter().filter(|row| row.missing.is_none()).any(larger);
+        (reduced && variants.iter().any(from_file)).then(|| {
+            format!(
+                "Avatars from files are drawn at no more than {resolution} pixels a side, below the size of the data: what was \
+                 fitted at another size scores lower (--profile standard keeps the data's size)"
+            )
         })
     }
 

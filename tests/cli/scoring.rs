@@ -82,7 +82,7 @@ fn folders_pair_up_by_name() {
     assert_eq!(found["frames"].as_object().unwrap().len(), 2);
     assert_eq!(found["protocol"]["frames"], 2, "{}", found["protocol"]);
     let text = desk.ok(args!["score", "renders", "truths", "--protocol", "3dgs"]);
-    assert!(text.contains("mean of 2 frames") && text.contains("protocol 3dgs@1: psnr "), "{text}");
+    assert!(text.contains("Protocol 3dgs@1.") && text.contains("mean of 2"), "{text}");
     let csv = desk.ok(args!["score", "renders", "truths", "--protocol", "3dgs", "--format", "csv"]);
     let line = csv.lines().find(|line| line.starts_with("mean of 2 frames,psnr,mean,")).unwrap();
     assert_eq!(line.split(',').nth(3).unwrap().parse::<f64>().unwrap(), mean);

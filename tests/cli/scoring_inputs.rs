@@ -157,6 +157,18 @@ fn sizes_must_agree_and_files_are_named() {
     std::fs::remove_file(desk.path("masks/2.png")).unwrap();
     desk.run(args!["score", "renders", "truths", "--mask", "masks"])
         .refuses(&["truths: frames 2", "masks"], "masks");
+    save("renders/2.png", 40, 36);
+    std::fs::rename(desk.path("masks"), desk.path("old")).unwrap();
+    for frame in ["1", "2"] {
+        let bytes = desk.bytes("old/1.png");
+        desk.put(&format!("masks/m_{frame}.png"), bytes);
+    }
+    let answer = desk.run(args!["score", "renders", "truths", "--mask", "masks"]).exits(0, "masks by number");
+    assert!(answer.err.contains("masks paired by their numbers: m_1 for 1"), "{}", answer.err);
+    let bytes = desk.bytes("old/1.png");
+    desk.put("masks/other_2.png", bytes);
+    desk.run(args!["score", "renders", "truths", "--mask", "masks"])
+        .refuses(&["m_1", "no partner"], "two of a number");
 }
 
 #[test]
@@ -200,5 +212,5 @@ fn images_below_the_size_of_the_network_have_no_lpips() {
     assert_eq!(scores["protocol"]["values"].get("lpips"), None);
     assert_eq!(scores["protocol"]["not_computed"]["lpips"], reason);
     let text = desk.ok(args!["score", a, b, "--protocol", "avatar-v1"]);
-    assert!(text.contains(&format!("lpips not computed ({reason})")), "{text}");
+    assert!(text.contains(&format!("LPIPS not computed: {reason}")), "{text}");
 }

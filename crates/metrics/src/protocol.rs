@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 /// What a straight truth is composited over; the render must have been drawn over the same.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected captured, or a colour as [0.0, 0.0, 0.0]")]
 pub enum Background {
     /// One colour.
     Colour([f32; 3]),

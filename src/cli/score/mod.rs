@@ -16,8 +16,8 @@ use skinsplat_core::scene::Image;
 use skinsplat_metrics::lpips::OneFrame;
 use skinsplat_metrics::lpips::weights::Networks;
 use skinsplat_metrics::{
-    FrameScore, LpipsVariant, MetricId, MetricsError, PerceptualDistance, Planes, Protocol, Truth, Wanted,
-    all_variants,
+    FrameScore, LpipsVariant, MetricId, MetricsError, PerceptualDistance, Planes, Protocol, Summary, Truth,
+    Wanted, all_variants,
 };
 use skinsplat_table::{Table, text};
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,8 +27,9 @@ use std::path::PathBuf;
 ///
 /// Prints every variant of PSNR and SSIM by its name; with a mask also those of the masked pixels (`_mask`), of the mask's
 /// bounding box (`_bbox`) and of images multiplied by the mask (`_image_times_mask`). --lpips adds LPIPS, and --protocol
-/// the scores of a paper's own evaluation, LPIPS included; `--protocol all` prints a table with the scores under every
-/// protocol instead, which shows how much the protocol alone moves them.
+/// the scores of a paper's own evaluation, LPIPS included: text, Markdown and LaTeX then hold these alone, CSV and JSON the
+/// variants too. `--protocol all` prints a table with the scores under every protocol instead, which shows how much the
+/// protocol alone moves them.
 ///
 /// An alpha channel of the truth is its mask, unless --mask names another, and is composited over the background. In JSON,
 /// `null` stands for an infinite PSNR (identical images); a variant that cannot be computed is listed under "not_computed"
@@ -43,7 +44,7 @@ pub(super) struct Score {
     render: PathBuf,
     /// True image, or folder of frames
     truth: PathBuf,
-    /// Mask of the subject, or folder of masks
+    /// Mask of the subject, or folder of masks, named as the truths or with their numbers
     #[arg(long, value_name = "M")]
     mask: Option<PathBuf>,
     /// Score under this protocol too: a preset, or a preset with changed choices (see `reproduce list protocols`); `all`
@@ -91,20 +92,23 @@ impl Score {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let folders = self.truth.is_dir();
         let pairs = if folders { pairs::folders } else { pairs::single };
-        let pairs = || pairs(&self.render, &self.truth, self.mask.as_deref());
+        let pairs = pairs(&self.render, &self.truth, self.mask.as_deref())?;
+        if let Some(guess) = pairs.iter().find_map(|pair| pair.guessed()).filter(|_| folders) {
+            context.note(format!("masks paired by their numbers: {guess}"));
+        }
         if self.protocol.as_deref() == Some(all::ID) {
-            all::run(self, &pairs()?, context)?;
+            all::run(self, &pairs, context)?;
             return Ok(Exit::Success);
         }
         let protocol = self.protocol.as_deref().map(Protocol::parse).transpose()?;
         let networks = self.weights.networks()?;
         let score = |pair: &Pair| self.score(pair, protocol.as_ref(), &networks);
-        let scored = pairs::each(&pairs()?, context, score)?;
+        let scored = pairs::each(&pairs, context, score)?;
         warn_of_backgrounds(&scored, context);
         warn_of_missing(&scored, protocol.as_ref(), context)?;
         match (folders, self.format.as_str()) {
             (false, "json") => emit_json(&scored[0])?,
-            (false, format) => emit_table(&summary::table(&scored, None, None), format)?,
+            (false, format) => emit_table(&table(&scored, None, None, format), format)?,
             (true, format) => emit_folder(&scored, protocol.as_ref(), format)?,
         }
         Ok(Exit::Success)
@@ -134,7 +138,7 @@ impl Score {
             };
         }
         let truth = Truth::Composited { rgb: &truth, mask };
-        let metrics: Vec<MetricId> = MetricId::of_frames().collect();
+        let metrics: Vec<MetricId> = MetricId::of_images().collect();
         let wanted = Wanted { lpips: Some(&distances), ..Wanted::of(&metrics) };
         let protocol = protocol.map(|p| p.score_with(&render, truth, wanted)).transpose();
         let (protocol, protocol_not_computed) = match protocol {
@@ -195,13 +199,21 @@ fn emit_folder(scored: &[Scored], protocol: Option<&Protocol>, format: &str) -> 
         let frames: BTreeMap<&str, &Scored> = scored.iter().map(|f| (f.name.as_str(), f)).collect();
         return emit_json(&json!({ "frames": frames, "mean": mean, "protocol": summary }));
     }
-    emit_table(&summary::table(scored, Some(&mean), summary.as_ref()), format)
+    emit_table(&table(scored, Some(&mean), summary.as_ref(), format), format)
 }
 
-/// Terminals get the rows without headings, and notes.
+/// For people, what was asked for: the protocol's scores alone, if there is one. For programs, everything.
+fn table(scored: &[Scored], means: Option<&Means>, summary: Option<&Summary>, format: &str) -> Table {
+    match scored.iter().find_map(|frame| frame.protocol.as_ref()) {
+        Some(score) if format != "csv" => summary::under_protocol(&score.protocol, scored, summary),
+        _ => summary::table(scored, means, summary),
+    }
+}
+
+/// Terminals get the rows of a list without headings, and notes.
 fn emit_table(table: &Table, format: &str) -> Result<()> {
     match format {
-        "text" => emit(&(text::rows(table) + &text::notes(table))),
+        "text" if table.columns.len() == 1 => emit(&(text::rows(table) + &text::notes(table))),
         format => emit(&written(table, format)),
     }
 }

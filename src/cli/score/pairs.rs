@@ -39,11 +39,8 @@ pub(super) fn single(render: &Path, truth: &Path, mask: Option<&Path>) -> Result
 /// The frames of two folders by name, sorted.
 pub(super) fn folders(render: &Path, truth: &Path, mask: Option<&Path>) -> Result<Vec<Pair>> {
     let (renders, truths) = (frames_of(render)?, frames_of(truth)?);
-    let masks = mask.map(frames_of).transpose()?;
     same_names(render, &renders, truth, &truths)?;
-    if let (Some(folder), Some(masks)) = (mask, &masks) {
-        same_names(folder, masks, truth, &truths)?;
-    }
+    let masks = mask.map(|folder| masks_of(folder, truth, &truths)).transpose()?;
     let pair = |((name, truth), render): ((String, PathBuf), PathBuf)| {
         let mask = masks.as_ref().and_then(|masks| masks.get(&name)).cloned();
         Pair { name, render, truth, mask }
@@ -75,6 +72,12 @@ impl Pair {
     pub(super) fn load(&self) -> Result<Loaded> {
         let mask = self.mask.as_deref().map(load_mask).transpose()?;
         Ok(Loaded { render: load_image(&self.render)?, truth: load_image(&self.truth)?, mask })
+    }
+
+    /// The mask and the frame, if the mask has another name.
+    pub(super) fn guessed(&self) -> Option<String> {
+        let stem = self.mask.as_ref()?.file_stem()?.to_string_lossy();
+        (stem != self.name).then(|| format!("{stem} for {}", self.name))
     }
 
     /// The files, for errors.
@@ -119,8 +122,11 @@ impl Loaded {
     }
 }
 
-/// Image files of a folder by stem, sorted.
-fn frames_of(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
+/// Image files by stem, sorted.
+type Frames = BTreeMap<String, PathBuf>;
+
+/// Those of a folder.
+fn frames_of(folder: &Path) -> Result<Frames> {
     let mut frames = BTreeMap::new();
     for path in listing::files(folder, "frames", &["png", "jpg", "jpeg", "npy"])? {
         let Some(stem) = path.file_stem().and_then(|s| s.to_str()) else { continue };
@@ -134,13 +140,32 @@ fn frames_of(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
     Ok(frames)
 }
 
-fn same_names(
-    left: &Path,
-    a: &BTreeMap<String, PathBuf>,
-    right: &Path,
-    b: &BTreeMap<String, PathBuf>,
-) -> Result<()> {
-    let strangers = |a: &BTreeMap<String, PathBuf>, b: &BTreeMap<String, PathBuf>| {
+/// The masks of a folder by the names of the truths: their own, or, where no name is one of a truth, the truth with the same
+/// number (`mask_0010` for `image_0010`).
+fn masks_of(folder: &Path, truth: &Path, truths: &Frames) -> Result<Frames> {
+    let masks = frames_of(folder)?;
+    if !masks.keys().any(|name| truths.contains_key(name)) {
+        let numbers: BTreeMap<&str, &PathBuf> =
+            masks.iter().filter_map(|(name, path)| Some((number(name)?, path))).collect();
+        let of_truth = |name: &String| Some((name.clone(), PathBuf::clone(numbers.get(number(name)?)?)));
+        let named: Frames = truths.keys().filter_map(of_truth).collect();
+        if numbers.len() == masks.len() && masks.len() == truths.len() && named.len() == masks.len() {
+            return Ok(named);
+        }
+    }
+    same_names(folder, &masks, truth, truths)?;
+    Ok(masks)
+}
+
+/// The last digits of a name.
+fn number(name: &str) -> Option<&str> {
+    let end = name.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let start = name[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
+    name.get(start..end)
+}
+
+fn same_names(left: &Path, a: &Frames, right: &Path, b: &Frames) -> Result<()> {
+    let strangers = |a: &Frames, b: &Frames| {
         let names: Vec<&str> = a.keys().filter(|k| !b.contains_key(*k)).map(String::as_str).collect();
         let more = if names.len() > 5 { format!(" and {} more", names.len() - 5) } else { String::new() };
         (!names.is_empty()).then(|| names.iter().take(5).copied().collect::<Vec<_>>().join(", ") + &more)

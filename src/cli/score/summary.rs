@@ -3,7 +3,7 @@
 use super::{Means, Scored};
 use serde_json::{Map, Value};
 use skinsplat_metrics::{FrameScore, MetricId, ProtocolId, Summary, Values};
-use skinsplat_table::{Cell, Column, Content, Digits, Label, Row, RowKind, Table};
+use skinsplat_table::{Cell, Column, Content, Digits, Direction, Label, Row, RowKind, Table};
 use std::collections::BTreeMap;
 
 /// As printed.
@@ -29,6 +29,60 @@ pub(super) fn table(scored: &[Scored], means: Option<&Means>, summary: Option<&S
         }
     }
     table
+}
+
+/// The frames and the protocol's aggregate of them: a column per metric.
+pub(super) fn under_protocol(protocol: &ProtocolId, scored: &[Scored], summary: Option<&Summary>) -> Table {
+    let digits = |metric: MetricId| Digits::Decimals(metric.decimals() + 1);
+    let column = |metric: MetricId| {
+        let better = Direction::higher_if(metric.higher_is_better());
+        Column::new(metric.id(), metric.title()).digits(digits(metric)).better(better)
+    };
+    let mut table = Table {
+        sentences: vec![format!("Protocol {protocol}")],
+        labels: vec![Label::new("frame", "Frame")],
+        columns: MetricId::of_images().map(column).collect(),
+        ..Table::new("scores", "Scores")
+    };
+    let mut add = |name: &str, kind: RowKind, value: &dyn Fn(MetricId) -> Result<f64, String>| {
+        let notes = &mut table.notes;
+        let cell = |metric: MetricId| match value(metric) {
+            Ok(value) => Cell::number(value, digits(metric)),
+            Err(why) => {
+                let note = format!("{} not computed: {why}", metric.title());
+                Cell { notes: vec![index(notes, &note)], ..Cell::new(Content::NotComputed, digits(metric)) }
+            }
+        };
+        let row = Row::new(name, [name], MetricId::of_images().map(cell).collect());
+        table.rows.push(Row { kind, ..row });
+    };
+    for frame in scored {
+        add(&frame.name, RowKind::Measured, &|metric| match &frame.protocol {
+            Some(score) => score.values.get(metric).ok_or_else(|| reason(&score.not_computed, metric)),
+            None => Err(frame.protocol_not_computed.clone().unwrap_or_default()),
+        });
+    }
+    if let Some(summary) = summary {
+        let name = format!("mean of {}", scored.len());
+        add(&name, RowKind::Mean, &|metric| {
+            summary.value(metric).ok_or_else(|| reason(&summary.not_computed, metric))
+        });
+    }
+    table
+}
+
+/// Why a metric was not computed.
+fn reason(missing: &BTreeMap<MetricId, String>, metric: MetricId) -> String {
+    missing.get(&metric).map_or("no reason given", String::as_str).to_owned()
+}
+
+/// The index of a note, which is added if it is new.
+fn index(notes: &mut Vec<String>, note: &str) -> usize {
+    let index = notes.iter().position(|known| known == note).unwrap_or(notes.len());
+    if index == notes.len() {
+        notes.push(note.to_owned());
+    }
+    index
 }
 
 /// The rows of one frame, or of the mean.
@@ -62,13 +116,12 @@ impl Frame<'_> {
 
     /// Every metric of frames under a protocol.
     fn protocol(&mut self, protocol: &ProtocolId, values: &Values, missing: &BTreeMap<MetricId, String>) {
-        for metric in MetricId::of_frames() {
+        for metric in MetricId::of_images() {
             let id = format!("protocol {protocol}: {}", metric.id());
             match values.get(metric) {
                 Some(value) => self.push(&id, Cell::number(value, DIGITS)),
                 None => {
-                    let why = missing.get(&metric).map_or("no reason given", String::as_str);
-                    self.none(&id, &format!("{id} not computed ({why})"));
+                    self.none(&id, &format!("{id} not computed ({})", reason(missing, metric)));
                 }
             }
         }
@@ -76,11 +129,7 @@ impl Frame<'_> {
 
     /// A row without a number, and the note that says why.
     fn none(&mut self, id: &str, note: &str) {
-        let notes = &mut self.table.notes;
-        let index = notes.iter().position(|known| known == note).unwrap_or(notes.len());
-        if index == notes.len() {
-            notes.push(note.to_owned());
-        }
+        let index = index(&mut self.table.notes, note);
         self.push(id, Cell { notes: vec![index], ..Cell::new(Content::NotComputed, DIGITS) });
     }
 

@@ -38,6 +38,11 @@ impl MetricId {
         Self::all().filter(|id| id.is_of_frames())
     }
 
+    /// Those that two images, perhaps with a mask, are enough for.
+    pub fn of_images() -> impl DoubleEndedIterator<Item = Self> + Clone {
+        Self::of_frames().filter(|id| !id.needs_bend())
+    }
+
     /// The metric of this name.
     pub fn from_id(id: &str) -> Option<Self> {
         Self::all().find(|metric| metric.id() == id)
