@@ -193,7 +193,7 @@ impl Command {
             Self::Stress(command) => command.run(context),
             Self::Inspect(command) => command.run(context),
             Self::Conform(command) => command.run(context),
-            Self::Completions(command) => command.run(),
+            Self::Completions(command) => command.run(context),
         }
     }
 }

@@ -64,7 +64,7 @@ fn top_level_help() {
                    degrades and breaks
       inspect      Show what a file or folder holds, and what is wrong with it
       conform      Check an engine that skins Gaussians, and name its bug
-      completions  Print a completion script for a shell
+      completions  Print a completion script for a shell, or the manual
       help         Print this message or the help of the given subcommand(s)
 
     Options:
@@ -202,6 +202,23 @@ fn completions_parse() {
             Err(error) => assert!(shell != "bash", "{shell}: {error}"),
         }
     }
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let desk = Desk::new();
+    assert!(desk.ok(args!["completions", "man"]).contains(".TH reproduce 1"));
+    desk.ok(args!["completions", "man", "--out", "man"]);
+    for subcommand in SUBCOMMANDS {
+        let page = desk.read(&format!("man/reproduce-{subcommand}.1"));
+        assert!(page.contains(".SH SYNOPSIS") && page.contains("Examples:"), "{subcommand}: {page}");
+    }
+    for (shell, file) in [("bash", "reproduce.bash"), ("zsh", "_reproduce"), ("fish", "reproduce.fish")] {
+        desk.ok(args!["completions", shell, "--out", "shells"]);
+        assert_eq!(desk.read(&format!("shells/{file}")), desk.ok(args!["completions", shell]), "{shell}");
+    }
+    desk.put("file", "");
+    desk.run(args!["completions", "man", "--out", "file/man"]).refuses(&["file/man"], "no folder");
 }
 
 /// What `reproduce ... | head -c 0` does: the reader goes away before the first byte.
