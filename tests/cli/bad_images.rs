@@ -94,3 +94,36 @@ fn arrays_that_are_no_images() {
     desk.put("bad.npy", b"\x93NUMPY\x01\x00");
     inspect(&["bad.npy"], "half a header");
 }
+
+/// Files that are evidently something else than their names say.
+#[test]
+fn what_a_file_is_instead_is_said() {
+    let desk = Desk::new();
+    desk.put("lfs.png", "version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 9\n");
+    desk.put("lfs.ply", "version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 9\n");
+    desk.put("gzip.npz", b"\x1f\x8b\x08\0\0\0\0\0");
+    desk.put("gzip.json", b"\x1f\x8b\x08\0\0\0\0\0");
+    desk.put("wide.json", b"\xff\xfe{\0}\0");
+    for (file, what) in [
+        ("lfs.png", "git lfs pull"),
+        ("lfs.ply", "git lfs pull"),
+        ("gzip.npz", "compressed by gzip"),
+        ("gzip.json", "compressed by gzip"),
+        ("wide.json", "UTF-16 text"),
+    ] {
+        desk.run(args!["inspect", file]).refuses(&[file, what], what);
+    }
+}
+
+#[test]
+fn masks_may_have_one_channel() {
+    let desk = Desk::new();
+    skinsplat_data::npy::write_f32(&desk.path("image.npy"), &[4, 4, 3], [0.5; 48]).unwrap();
+    for shape in [vec![4, 4], vec![4, 4, 1]] {
+        skinsplat_data::npy::write_f32(&desk.path("mask.npy"), &shape, [1.0; 16]).unwrap();
+        desk.ok(args!["score", "image.npy", "image.npy", "--mask", "mask.npy"]);
+    }
+    skinsplat_data::npy::write_f32(&desk.path("mask.npy"), &[1, 4, 4], [1.0; 16]).unwrap();
+    desk.run(args!["score", "image.npy", "image.npy", "--mask", "mask.npy"])
+        .refuses(&["mask.npy", "(H, W) or (H, W, 1)"], "channels first");
+}

@@ -1,5 +1,6 @@
 //! Named arrays, whichever container holds them: an `.npz` archive or a pickled dictionary.
 
+use super::error::disguise;
 use super::npy::Array;
 use super::npz::Archive;
 use super::pickle::{self, Pickle, Rows};
@@ -33,7 +34,12 @@ impl Arrays {
         opened.map_err(|cause| Error::read(path, what, expected, cause))?;
         let container = match pickle::is_pickle_file(path, &start) {
             true => Container::Pickle(Pickle::read(path, what)?),
-            false => Container::Archive(Archive::open(path, what)?),
+            false => {
+                if let Some(found) = disguise(&start).filter(|_| !start.starts_with(b"PK")) {
+                    return Err(Error::invalid(path, what, found, expected));
+                }
+                Container::Archive(Archive::open(path, what)?)
+            }
         };
         Ok(Self { container, extents: Extents::default() })
     }

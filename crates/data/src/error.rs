@@ -118,9 +118,26 @@ pub fn read_bytes(path: &Path, field: &str, expected: &str) -> Result<Vec<u8>, E
 /// Reads a whole UTF-8 file, without the byte order mark that some editors put before it.
 pub fn read_text(path: &Path, field: &str, expected: &str) -> Result<String, Error> {
     let bytes = read_bytes(path, field, expected)?;
+    if let Some(found) = disguise(&bytes) {
+        return Err(Error::invalid(path, field, found, expected));
+    }
     let text = String::from_utf8(bytes);
     let text = text.map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// What a file is that evidently is another than its name says, by how it begins.
+pub(crate) fn disguise(bytes: &[u8]) -> Option<&'static str> {
+    const KINDS: [(&[u8], &str); 7] = [
+        (&[0x1f, 0x8b], "compressed by gzip"),
+        (b"PK\x03\x04", "a zip archive"),
+        (&[0x28, 0xb5, 0x2f, 0xfd], "compressed by zstd"),
+        (b"\xfd7zXZ", "compressed by xz"),
+        (&[0xff, 0xfe], "UTF-16 text"),
+        (&[0xfe, 0xff], "UTF-16 text"),
+        (b"version https://git-lfs", "a pointer of Git LFS, not the file (git lfs pull fetches it)"),
+    ];
+    KINDS.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, kind)| *kind)
 }
 
 /// Reads a JSON file into a type; the error names the place in the text. A byte order mark before it is skipped, as

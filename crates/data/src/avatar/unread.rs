@@ -16,7 +16,12 @@ struct Unread {
 const OLD_TORCH: &[u8] = b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46\xf9\x20\x6a\xa8\x50\x19\x2e";
 const CONVERTED: &str = "a PLY: splat-transform (npm: @playcanvas/splat-transform) converts it";
 
-const UNREAD: [Unread; 11] = [
+const UNREAD: [Unread; 12] = [
+    Unread {
+        recognises: |s| s.bytes.starts_with(b"version https://git-lfs"),
+        name: "a pointer of Git LFS, not the file",
+        expected: "the file itself: git lfs pull fetches it",
+    },
     Unread {
         recognises: |s| {
             s.bytes.starts_with(b"NGSP") || (s.extension() == "spz" && s.bytes.starts_with(&[0x1f, 0x8b]))

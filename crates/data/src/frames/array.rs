@@ -29,11 +29,11 @@ pub(super) fn image(path: &Path) -> Result<Channels, Error> {
     Ok(Channels { width, height, count, values: scaled(&values, full.unwrap_or(1.0)), step: 1.0 })
 }
 
-/// (H, W), 0 to 1 or 0 to the integers' largest.
+/// (H, W) or (H, W, 1), 0 to 1 or 0 to the integers' largest.
 pub(super) fn mask(path: &Path) -> Result<Channels, Error> {
     let Stored { shape, values, full } = Stored::read(path)?;
-    let &[height, width] = &shape[..] else {
-        return Err(Error::invalid(path, "array", format!("shape {shape:?}"), "(H, W)"));
+    let (&[height, width] | &[height, width, 1]) = &shape[..] else {
+        return Err(Error::invalid(path, "array", format!("shape {shape:?}"), "(H, W) or (H, W, 1)"));
     };
     check_size(path, width, height)?;
     let (low, high) = range(&values);

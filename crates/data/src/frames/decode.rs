@@ -1,6 +1,6 @@
 //! PNG and JPEG files as channels.
 
-use super::{Channels, Error, IMAGE};
+use super::{Channels, Error, IMAGE, error};
 use image::codecs::png::PngDecoder;
 use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage, ImageDecoder, RgbImage};
@@ -29,7 +29,7 @@ pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Channels, Error> {
         _ if bytes.starts_with(PNG) => png(path, bytes),
         _ if bytes.starts_with(JPEG) => jpeg(path, bytes),
         [] => Err(broken(path, "an empty file")),
-        _ => Err(broken(path, "neither PNG nor JPEG")),
+        _ => Err(broken(path, error::disguise(bytes).unwrap_or("neither PNG nor JPEG"))),
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) fn image_from_bytes(path: &Path, bytes: &[u8]) -> Result<(Image, Opti
     decode(path, bytes)?.into_image(path)
 }
 
-/// Loads a mask with values in \[0, 1\]: a grey PNG or JPEG, or an `.npy` array (H, W) of booleans, of 0 to 1 or of 0 to
+/// Loads a mask with values in \[0, 1\]: a grey PNG or JPEG, or an `.npy` array (H, W) or (H, W, 1) of booleans, of 0 to 1 or of 0 to
 /// 255. Integers that are only 0 and 1 count as 0 and 1. A colour image is a mask if its channels are equal; an alpha
 /// channel is ignored.
 ///
