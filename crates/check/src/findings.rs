@@ -45,7 +45,7 @@ pub(super) fn of(sequence: &Sequence, seen: &[Seen]) -> Vec<Finding> {
     }
     let whole: Vec<Edges> = both.iter().filter_map(|(seen, shadows)| Edges::of(seen, shadows)).collect();
     let finding = moved(sequence, &whole).or_else(|| order(sequence, &both));
-    let finding = finding.or_else(|| zoom::far_off(sequence, &both));
+    let finding = finding.or_else(|| zoom::far_off(sequence, &both, blame(&whole)));
     let finding = finding.or_else(|| lens::bent(sequence, &both));
     found.extend(finding.or_else(|| sized(sequence, &whole)));
     if !found.iter().any(|finding| finding.spoils) {
@@ -239,18 +239,22 @@ fn sized(sequence: &Sequence, whole: &[Edges]) -> Option<Finding> {
     if (ratio - 1.0).abs() < SIZE.max(PIXELS / height) {
         return None;
     }
-    // The point that a wrong size leaves in its place: the principal point if the focal length is wrong, the body's
-    // middle if the body is.
-    let away = |of: fn(&Edges) -> [f64; 2]| {
-        median(whole.iter().map(|e| e.residual(ratio, of(e))).collect()).unwrap_or(f64::INFINITY)
-    };
-    let (camera, body) = (away(|e| e.principal), away(|e| e.middle));
     let what = format!("the person is {ratio:.3} times as large as the body");
-    Some(if camera < 0.7 * body {
+    Some(if blame(whole) == Some(Kind::Camera) {
         Finding::new(Kind::Camera, &sequence.id, format!("{what}, about the principal point: focal length"))
     } else {
         Finding::new(Kind::WrongGenderOrModel, &sequence.id, format!("{what}, about its middle"))
     })
+}
+
+/// Whose fault a wrong size is, if edges can tell: of the point that it leaves in its place. That is the principal point if the focal
+/// length is wrong, the body's middle or its model's origin if the body is.
+fn blame(whole: &[Edges]) -> Option<Kind> {
+    let ratio = median(whole.iter().map(Edges::ratio).collect())?;
+    let away = |of: fn(&Edges) -> [f64; 2]| median(whole.iter().map(|e| e.residual(ratio, of(e))).collect());
+    let camera = away(|e| e.principal)?;
+    let body = away(|e| e.centres[0])?.min(away(|e| e.centres[1])?);
+    Some(if camera < body { Kind::Camera } else { Kind::WrongGenderOrModel })
 }
 
 /// Where mask and body end, in a frame that shows both whole.
@@ -258,7 +262,7 @@ struct Edges {
     mask: [f64; 4],
     body: [f64; 4],
     principal: [f64; 2],
-    middle: [f64; 2],
+    centres: [[f64; 2]; 2],
     side: f64,
 }
 
@@ -272,7 +276,7 @@ impl Edges {
             mask: shadows.mask.bounds()?,
             body: shadows.body.bounds()?,
             principal: [camera.cx, camera.cy],
-            middle: shadows.middle?,
+            centres: [shadows.centres[0]?, shadows.centres[1]?],
             side: f64::from(camera.width.max(camera.height)),
         })
     }

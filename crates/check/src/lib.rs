@@ -125,8 +125,8 @@ struct Seen {
 struct Shadows {
     mask: Shadow,
     body: Shadow,
-    /// Where the body's middle is seen, pixels.
-    middle: Option<[f64; 2]>,
+    /// Where a body of another size would stay, pixels: its middle, and the origin of its model.
+    centres: [Option<[f64; 2]>; 2],
 }
 
 struct Problem {
@@ -176,22 +176,22 @@ fn shadows_of(small: &Sequence, index: usize, camera: &Camera) -> Result<Shadows
         Problem { kind: if labels { Kind::MaskRange } else { Kind::MissingFrames }, text }
     };
     let truth = small.truth(index).map_err(|error| unreadable(error.to_string()))?;
-    let (body, middle) = project(small, index, camera).map_err(|error| unreadable(error.to_string()))?;
-    Ok(Shadows { mask: Shadow::of(&truth.alpha), body: Shadow::of(&body), middle })
+    let (body, centres) = project(small, index, camera).map_err(|error| unreadable(error.to_string()))?;
+    Ok(Shadows { mask: Shadow::of(&truth.alpha), body: Shadow::of(&body), centres })
 }
 
-/// The silhouette of the posed body, and where its middle is seen.
+/// The silhouette of the posed body, and where its middle and its model's origin are seen.
 fn project(
     sequence: &Sequence,
     index: usize,
     camera: &Camera,
-) -> Result<(Mask, Option<[f64; 2]>), skinsplat_core::scene::SceneError> {
+) -> Result<(Mask, [Option<[f64; 2]>; 2]), skinsplat_core::scene::SceneError> {
     let pose = &sequence.poses[sequence.frames[index].pose];
     let body = PosedBody::new(&sequence.body, pose)?;
     let mesh = body.mesh();
     let shadow =
         silhouette(&Mesh::new(&mesh.vertices, &sequence.body.faces)?, camera, SamplePattern::new(2))?;
     let count = mesh.vertices.len().max(1) as f64;
-    let centre = mesh.vertices.iter().map(|v| v.as_dvec3()).sum::<glam::DVec3>() / count;
-    Ok((shadow, camera.project(centre).map(|(at, _)| at.to_array())))
+    let middle = mesh.vertices.iter().map(|v| v.as_dvec3()).sum::<glam::DVec3>() / count;
+    Ok((shadow, [middle, pose.translation].map(|centre| Some(camera.project(centre)?.0.to_array()))))
 }
