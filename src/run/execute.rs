@@ -1,20 +1,22 @@
 //! Executing jobs: one frame at a time, its truth loaded once, every variant posed, rendered and scored against it.
 
 use super::avatars::Workshop;
-use super::drawable::{Drawable, Drawn, Look, Scratch};
-use super::frame::{Frame, Scored, behind, check_background};
+use super::before::{FrameBefore, Seen};
+use super::drawable::{Drawable, Drawn, Scratch};
+use super::frame::{Frame, Scored, check_background};
+use super::looks::{look, noisy_pose};
 use super::store::Store;
 use super::{Error, Library};
 use crate::experiment::{FittedOutcome, FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
 use rayon::prelude::*;
-use skinsplat_core::scene::Pose;
-use skinsplat_data::{Sequence, Truth};
+use skinsplat_data::Sequence;
 use skinsplat_fit::train::Step;
 use skinsplat_metrics::lpips::{NetworkSource, OneFrame};
 use skinsplat_metrics::{PerceptualDistance, Wanted};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 /// What happened, for whoever watches.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,9 +157,8 @@ fn run_frame(
     for job in jobs {
         for variant in &job.variants {
             let outcome = frame.as_ref().map_err(Clone::clone).and_then(|frame| {
-                let noisy = noisy_pose(variant, sequence.as_ref().ok(), first.frame);
                 let avatar = &avatars[&variant.avatar];
-                run_variant(job, variant, (frame, noisy), avatar, &distances, scratch)
+                run_variant(job, variant, frame, avatar, &distances, scratch)
                     .map_err(|error| error.to_string())
             });
             let (outcome, seconds) =
@@ -175,45 +176,46 @@ pub(super) fn test_sequence(job: &Job, library: &Library) -> Result<Sequence, Er
     Ok(job.resolution.map_or_else(|| sequence.clone(), |side| sequence.reduced(side)))
 }
 
-/// How a variant of a job is drawn where its truth is this one.
-pub(super) fn look<'a>(job: &Job, variant: &JobVariant, truth: &'a Truth) -> Result<Look<'a>, Error> {
-    let background = behind(&job.protocol, truth)?;
-    Ok(Look { strategy: variant.strategy, background, antialiased: job.antialiased })
-}
-
-/// The pose of a frame with the variant's noise, if it has any.
-pub(super) fn noisy_pose(variant: &JobVariant, sequence: Option<&Sequence>, frame: usize) -> Option<Pose> {
-    let (noise, sequence) = (variant.noise?, sequence?);
-    Some(sequence.noisy_pose(sequence.frames[frame].pose, noise.degrees, noise.seed))
-}
-
 fn run_variant(
     job: &Job,
     variant: &JobVariant,
-    (frame, noisy): (&Frame<'_>, Option<Pose>),
+    frame: &Frame<'_>,
     avatar: &Built,
     distances: &dyn PerceptualDistance,
     scratch: &mut Scratch,
 ) -> Result<(Outcome, Seconds), Error> {
     let avatar = avatar.as_ref().map_err(|problem| Error::Avatar { problem: problem.clone() })?;
     let wanted = Wanted { lpips: Some(distances), ..Wanted::of(&job.metrics) };
+    let noisy = noisy_pose(variant, frame.place.0, frame.place.1);
     if noisy.is_some() && matches!(avatar, Drawable::Renders(_)) {
         return Err(Error::NoPoseToDisturb);
     }
     let noisy_view = noisy.as_ref().map(|pose| frame.in_pose(pose)).transpose()?;
     let view = noisy_view.as_ref().unwrap_or(&frame.view);
     let look = look(job, variant, &frame.truth)?;
+    let start = Instant::now();
+    let before = FrameBefore::of(Seen { job, variant, avatar, view }, frame, scratch);
+    let before_seconds = start.elapsed().as_secs_f64();
     let Scored { score, drawn, score_seconds } =
-        frame.evaluate_view(view, avatar, &look, &job.protocol, wanted, scratch)?;
+        frame.evaluate_view(view, avatar, &look, &job.protocol, before.wanted(wanted), scratch)?;
     let fitted = variant.fitted.as_ref().map(|options| {
         let fitted = avatar.fit_pose(view, &frame.truth, &look, options).and_then(|found| {
             let view = frame.in_pose(&found.pose)?;
-            let scored = frame.evaluate_view(&view, avatar, &look, &job.protocol, wanted, scratch)?;
+            let scored =
+                frame.evaluate_view(&view, avatar, &look, &job.protocol, unfitted(wanted), scratch)?;
             Ok(FittedOutcome::Scored { score: scored.score, turned_degrees: found.turned_degrees })
         });
         fitted.unwrap_or_else(|error| FittedOutcome::Failed(error.to_string()))
     });
     let Drawn { visible_splats, pose_seconds, render_seconds, .. } = drawn;
-    let seconds = Seconds { pose: pose_seconds, render: render_seconds, score: score_seconds };
+    // Whatever is drawn in order to score is part of scoring.
+    let seconds =
+        Seconds { pose: pose_seconds, render: render_seconds, score: before_seconds + score_seconds };
     Ok((Outcome::Scored { score, visible_splats, fitted }, seconds))
+}
+
+/// What is wanted of a frame whose pose was fitted: that of the frame before was not.
+fn unfitted(wanted: Wanted<'_>) -> Wanted<'_> {
+    let why = "its pose was not fitted";
+    Wanted { before: Err(why), rotation_jumps: Err(why), ..wanted }
 }

@@ -6,9 +6,10 @@
 //! draws them in poses that no frame has.
 //!
 //! Each file imports only from those before it in this list: `textured`, `foreign`, `drawable`, `library`, `frame`,
-//! `held_out`, `cache`, `refined_poses`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`, `pictures`, `motion`.
+//! `looks`, `before`, `held_out`, `cache`, `refined_poses`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`, `pictures`, `motion`.
 
 mod avatars;
+mod before;
 pub mod cache;
 mod curve_frames;
 pub mod curves;
@@ -23,6 +24,7 @@ mod frame;
 pub mod gallery;
 pub mod held_out;
 mod library;
+mod looks;
 mod machine;
 pub mod merge;
 pub mod motion;

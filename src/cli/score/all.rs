@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &Score, pairs: &[Pair], context: Context) -> Result
 fn frame(arguments: &Score, pair: &Pair, networks: &Networks) -> Result<Vec<Cell>> {
     let loaded = pair.load()?;
     let distances = OneFrame::new(networks);
-    let metrics: Vec<MetricId> = MetricId::of_frames().collect();
+    let metrics: Vec<MetricId> = MetricId::of_images().collect();
     let wanted = Wanted { lpips: Some(&distances), ..Wanted::of(&metrics) };
     let cell = |protocol: &Protocol| {
         let background = arguments.background(Some(protocol));
@@ -103,7 +103,7 @@ fn table(rows: &[Row], frames: usize) -> Table {
     let mut table = Table {
         sentences: vec![format!("{frames} frames"), spread(rows)],
         labels: vec![Label::new("protocol", "protocol")],
-        columns: MetricId::of_frames().map(metric).collect(),
+        columns: MetricId::of_images().map(metric).collect(),
         ..Table::new("protocols", "The same frames under every protocol")
     };
     table.columns.extend(choices.map(|(key, title)| Column::text(key, title)));
@@ -127,7 +127,7 @@ fn cells(row: &Row, frames: usize, notes: &mut Vec<String>) -> Vec<table::Cell> 
         Some(value) => table::Cell::number(value, digits(id)),
         None => table::Cell::new(Content::NotComputed, digits(id)),
     };
-    let mut metrics: Vec<table::Cell> = MetricId::of_frames().map(metric).collect();
+    let mut metrics: Vec<table::Cell> = MetricId::of_images().map(metric).collect();
     let mut note = |note: String, cells: &mut [table::Cell]| {
         cells.iter_mut().for_each(|cell| cell.notes.push(notes.len()));
         notes.push(note);
@@ -136,7 +136,7 @@ fn cells(row: &Row, frames: usize, notes: &mut Vec<String>) -> Vec<table::Cell> 
     match &row.outcome {
         Err(why) => note(reason(why), &mut metrics),
         Ok(summary) => {
-            for (cell, id) in metrics.iter_mut().zip(MetricId::of_frames()) {
+            for (cell, id) in metrics.iter_mut().zip(MetricId::of_images()) {
                 summary.not_computed.get(&id).into_iter().for_each(|why| note(reason(why), from_mut(cell)));
             }
         }
@@ -168,6 +168,6 @@ fn spread(rows: &[Row]) -> String {
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         format!("{} {} to {}", id.title(), digits(id).show(low), digits(id).show(high))
     };
-    let ranges: Vec<String> = MetricId::of_frames().map(range).collect();
+    let ranges: Vec<String> = MetricId::of_images().map(range).collect();
     format!("The protocol alone, whole images: {}", ranges.join(", "))
 }

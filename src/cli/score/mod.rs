@@ -134,7 +134,7 @@ impl Score {
             };
         }
         let truth = Truth::Composited { rgb: &truth, mask };
-        let metrics: Vec<MetricId> = MetricId::of_frames().collect();
+        let metrics: Vec<MetricId> = MetricId::of_images().collect();
         let wanted = Wanted { lpips: Some(&distances), ..Wanted::of(&metrics) };
         let protocol = protocol.map(|p| p.score_with(&render, truth, wanted)).transpose();
         let (protocol, protocol_not_computed) = match protocol {

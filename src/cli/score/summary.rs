@@ -62,7 +62,7 @@ impl Frame<'_> {
 
     /// Every metric of frames under a protocol.
     fn protocol(&mut self, protocol: &ProtocolId, values: &Values, missing: &BTreeMap<MetricId, String>) {
-        for metric in MetricId::of_frames() {
+        for metric in MetricId::of_images() {
             let id = format!("protocol {protocol}: {}", metric.id());
             match values.get(metric) {
                 Some(value) => self.push(&id, Cell::number(value, DIGITS)),
