@@ -49,6 +49,7 @@ impl Watch {
                 let Step { iteration, iterations, psnr, splats, .. } = step;
                 self.detail(format!(" | iteration {iteration}/{iterations}, {psnr:.2} dB, {splats} splats"));
             }
+            Event::Took(..) => {}
             Event::AvatarReady | Event::FrameDone => {
                 self.detail(String::new());
                 self.bar.inc(1);

@@ -3,8 +3,10 @@
 use super::avatars::Workshop;
 use super::before::{FrameBefore, Seen};
 use super::drawable::{Drawable, Drawn, Scratch};
+use super::fitting::Part;
 use super::frame::{Frame, Scored, check_background};
 use super::looks::{look, noisy_pose};
+use super::sizes::bytes;
 use super::store::Store;
 use super::{Error, Library};
 use crate::experiment::{FittedOutcome, FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
@@ -13,7 +15,9 @@ use skinsplat_data::Sequence;
 use skinsplat_fit::train::Step;
 use skinsplat_metrics::lpips::{NetworkSource, OneFrame};
 use skinsplat_metrics::{PerceptualDistance, Wanted};
+use skinsplat_posing::BendingJoints;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -25,6 +29,8 @@ pub enum Event {
     Avatars(usize),
     /// This one comes next.
     Avatar(String),
+    /// A part of its fit took so many seconds.
+    Took(Part, f64),
     /// An iteration of its fit is done.
     Fitting(Step),
     /// Something is wrong, but not fatally.
@@ -62,10 +68,13 @@ pub fn execute(
             .map_or(Ok(()), |frame| check_background(&job.protocol, &frame.source))?;
     }
     let avatars = prepare_avatars(plan, jobs, library, folder, watch)?;
+    let bending = bending(jobs, library)?;
+    let bytes = bytes(plan, folder);
+    let at_hand = AtHand { library, networks, avatars: &avatars, bending: &bending, bytes: &bytes };
     watch(Event::Frames(jobs.len()));
     let state = Mutex::new((store, Left::of(jobs)));
     by_frame(jobs).par_iter().try_for_each_init(Scratch::default, |scratch, group| {
-        let records = run_frame(group, library, networks, &avatars, scratch);
+        let records = run_frame(group, &at_hand, scratch);
         let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
         let (store, left) = &mut *state;
         store.append(&records)?;
@@ -138,20 +147,40 @@ fn by_frame(jobs: &[Job]) -> Vec<Vec<&Job>> {
     groups.into_values().collect()
 }
 
+/// What the frames of a run share.
+struct AtHand<'a> {
+    library: &'a Library,
+    networks: &'a dyn NetworkSource,
+    avatars: &'a Avatars,
+    /// By [`Job::sequence_name`].
+    bending: &'a BTreeMap<String, BendingJoints>,
+    /// Of the files of an avatar, by its key.
+    bytes: &'a BTreeMap<&'a str, u64>,
+}
+
+/// Which joints bend the body of each sequence.
+fn bending(jobs: &[Job], library: &Library) -> Result<BTreeMap<String, BendingJoints>, Error> {
+    let mut found = BTreeMap::new();
+    for job in jobs {
+        if let Entry::Vacant(entry) = found.entry(job.sequence_name()) {
+            let sequence = library.sequence(&job.dataset, &job.subject, &job.sequence)?;
+            entry.insert(BendingJoints::of(&sequence.body));
+        }
+    }
+    Ok(found)
+}
+
 /// The records of all jobs of one frame.
-fn run_frame(
-    jobs: &[&Job],
-    library: &Library,
-    networks: &dyn NetworkSource,
-    avatars: &Avatars,
-    scratch: &mut Scratch,
-) -> Vec<FrameRecord> {
+fn run_frame(jobs: &[&Job], at_hand: &AtHand<'_>, scratch: &mut Scratch) -> Vec<FrameRecord> {
+    let AtHand { library, networks, avatars, bending, bytes } = *at_hand;
     let first = jobs[0];
     let sequence = test_sequence(first, library);
     let frame = sequence
         .as_ref()
         .map_err(ToString::to_string)
         .and_then(|sequence| Frame::load(sequence, first.frame, None).map_err(|error| error.to_string()));
+    let joints = bending.get(&first.sequence_name());
+    let bend = joints.zip(frame.as_ref().ok()).and_then(|(joints, frame)| joints.widest(&frame.view.body));
     let distances = OneFrame::new(networks);
     let mut records = Vec::new();
     for job in jobs {
@@ -164,7 +193,8 @@ fn run_frame(
             let (outcome, seconds) =
                 outcome.unwrap_or_else(|problem| (Outcome::Error(problem), Seconds::default()));
             let (key, label) = (variant.key.clone(), job.label(variant));
-            records.push(FrameRecord { key, label, outcome, seconds });
+            let bytes = bytes.get(variant.avatar.as_str()).copied();
+            records.push(FrameRecord { key, label, outcome, seconds, bend, bytes });
         }
     }
     records
