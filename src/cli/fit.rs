@@ -91,6 +91,7 @@ impl Fit {
         let report = fitting::fit(&training, &options, &trained_on, &files, tests, &mut |event| {
             match event {
                 FitEvent::Starting => watch.start("start", 1),
+                FitEvent::Took(..) => {}
                 FitEvent::Warning(text) | FitEvent::Damage(text) => {
                     watch.above(&format!("warning: {text}"), context.quiet)
                 }

@@ -6,10 +6,12 @@ use image::RgbImage;
 use skinsplat::report::Results;
 use skinsplat::report::html::{BOUND, Extras, KeptPictures, MovingPicture, Stills, frames_that_fit, html};
 use skinsplat::report::timing;
+use skinsplat::run::costs::{self, Costs};
 use skinsplat::run::pictures::{INDEX, Index, Keep, Kept, Moving};
 use skinsplat::run::store;
 use skinsplat_data::error::{read_bytes, read_text};
 use skinsplat_data::{atomic, select::evenly_spaced};
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
@@ -48,8 +50,14 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images) -> Result<S
         false => String::new(),
     };
     let records = store::merge(store::stores(folder)?.iter().map(std::path::PathBuf::as_path))?;
-    let tables = timing::costs(results, &records).into_iter().collect();
-    let mut extras = Extras { pictures: KeptPictures::default(), curves, tables, bound: BOUND };
+    let measured = folder.join(costs::FILE_NAME);
+    let measured: Option<Costs> = match measured.is_file() {
+        true => Some(super::selection::read_json(&measured)?),
+        false => None,
+    };
+    let tables = timing::costs(results, &records, measured.as_ref()).into_iter().collect();
+    let bends = records.into_values().filter_map(|record| Some((record.key, record.bend?))).collect();
+    let mut extras = Extras { pictures: KeptPictures::default(), bends, curves, tables, bound: BOUND };
     let pictures = folder.join(PICTURES);
     let Some(mut index) = index(&pictures, images)? else { return Ok(html(results, &extras)) };
     // The run may have tables that the page has not.
@@ -63,6 +71,7 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images) -> Result<S
         let fit = frames_that_fit(results, &extras, index.frames.len());
         extras.pictures.stills = stills(&pictures, &index.frames, fit)?;
     }
+    extras.pictures.unread = unread(&index.frames, &extras.pictures.stills);
     Ok(html(results, &extras))
 }
 
@@ -91,6 +100,13 @@ fn index(folder: &Path, images: Images) -> Result<Option<Index>> {
 fn stills(folder: &Path, frames: &[Kept], most: usize) -> Result<Vec<Stills>> {
     let frames: Vec<&Kept> = frames.iter().collect();
     evenly_spaced(&frames, Some(most)).into_iter().map(|kept| still(folder, kept)).collect()
+}
+
+/// Frames whose pictures were not read.
+fn unread(frames: &[Kept], read: &[Stills]) -> Vec<[String; 3]> {
+    let read: BTreeSet<[&String; 3]> = read.iter().map(|of| [&of.table, &of.sequence, &of.frame]).collect();
+    let names = frames.iter().map(|of| [&of.table, &of.sequence, &of.frame]);
+    names.filter(|names| !read.contains(names)).map(|names| names.map(String::clone)).collect()
 }
 
 fn still(folder: &Path, kept: &Kept) -> Result<Stills> {

@@ -67,6 +67,7 @@ impl Watch {
                     " | {avatar}, iteration {iteration}/{iterations}, {psnr:.2} dB, {splats} splats"
                 ));
             }
+            Event::Took(..) => {}
             Event::AvatarReady | Event::FrameDone => {
                 self.detail(String::new());
                 self.bar.inc(1);

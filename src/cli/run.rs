@@ -14,7 +14,7 @@ use skinsplat::run::plan_file::{LeftOut, PlanFile};
 use skinsplat::run::provenance::{Provenance, Stopwatch};
 use skinsplat::run::store::{self, FILE_NAME, Store};
 use skinsplat::run::{self, Machine};
-use skinsplat::run::{cache, gallery};
+use skinsplat::run::{cache, costs, gallery};
 use skinsplat_data::atomic;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -43,7 +43,8 @@ pub(super) struct Run {
     /// pictures of those frames (key), or of every frame (all), for pages and comparisons [default with --html: key]
     #[arg(long, value_name = "WHICH", num_args = 0..=1, default_missing_value = "key", conflicts_with = "shard")]
     images: Option<Images>,
-    /// Also write the results as one page for a browser, with pictures to compare: below 15 MB
+    /// Also write the results as one page for a browser, with pictures to compare: below 15 MB. A few frames are drawn again, for
+    /// times with repeats (costs.json)
     #[arg(long, value_name = "FILE", conflicts_with = "shard")]
     html: Option<PathBuf>,
     /// Also write motion/: the avatars of every variant under a motion (smplx, AMASS or AIST++ .npz or .pkl, transforms.json,
@@ -256,10 +257,12 @@ impl Run {
                 watch.see(event)
             })?;
         }
-        match &self.html {
-            Some(path) => write_page(path, &page(results, &self.out, images)?, context),
-            None => Ok(()),
-        }
+        let Some(path) = &self.html else { return Ok(()) };
+        let watch = Watch::new(context.quiet);
+        let costs = costs::measure(plan, library, &self.out.join(AVATARS), &|event| watch.see(event))?;
+        drop(watch);
+        write_text(&self.out.join(costs::FILE_NAME), &(serde_json::to_string_pretty(&costs)? + "\n"))?;
+        write_page(path, &page(results, &self.out, images)?, context)
     }
 
     fn write_motion(

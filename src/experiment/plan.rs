@@ -220,6 +220,9 @@ impl Builder<'_> {
             .map(|d| (d.registered_id().to_owned(), d.title.clone()))
             .collect();
         let mut data_notes = self.data_notes(&rows);
+        if experiment.columns.iter().any(|column| column.metric.needs_before()) {
+            data_notes.extend(self.frames_apart(&rows));
+        }
         if source != Source::Own {
             data_notes.extend(self.why_not_own(experiment));
         }
@@ -281,6 +284,21 @@ impl Builder<'_> {
         notes
     }
 
+    /// Test sequences whose frames are not successive points in time, for columns that compare a frame with the one before.
+    fn frames_apart(&self, rows: &[DataRow]) -> Vec<String> {
+        let note = |row: &DataRow| {
+            let steps = time_steps(find_sequence(self.subject(row), &row.sequence));
+            let (least, most) = (steps.iter().min()?, steps.iter().max()?);
+            let far = match least == most {
+                true => format!("{most}"),
+                false => format!("{least} to {most}"),
+            };
+            (*most > 1)
+                .then(|| format!("{}: frames of {} are {far} time steps apart", row.subject, row.sequence))
+        };
+        rows.iter().filter(|row| row.missing.is_none()).filter_map(note).collect()
+    }
+
     /// What a variant needs on a row, before any frame: its avatar and its strategy.
     fn prepare(
         &mut self,
@@ -336,6 +354,12 @@ impl Builder<'_> {
         let metrics = metrics_of(experiment);
         let lpips = metrics.contains(&MetricId::LPIPS);
         let weights = self.options.lpips_weights.as_ref().filter(|given| given.net == protocol.lpips.net);
+        // Which frame comes before which: nothing else depends on the points in time.
+        let times: Option<Vec<usize>> = metrics
+            .iter()
+            .any(|metric| metric.needs_before())
+            .then(|| test.frames.iter().map(|frame| frame.time).collect());
+        let times = times.map(|times| content_key(&json!({ "times": times })));
         let choices = Protocol { title: String::new(), source: String::new(), ..Protocol::clone(protocol) };
         for &frame in &row.frames {
             let variants = variants.iter().map(|prepared| {
@@ -347,6 +371,9 @@ impl Builder<'_> {
                 });
                 if let Some(noise) = &prepared.noise {
                     content["pose_noise"] = json!(noise);
+                }
+                if let Some(times) = &times {
+                    content["times"] = json!(times);
                 }
                 if let Some(fitted) = &prepared.fitted {
                     content["fitted"] = json!(fitted);
@@ -403,6 +430,12 @@ fn metrics_of(experiment: &Experiment) -> Vec<MetricId> {
     let shown = experiment.columns.iter().map(|column| column.metric);
     let all: BTreeSet<MetricId> = shown.chain([MetricId::PSNR, MetricId::SPLATS]).collect();
     all.into_iter().collect()
+}
+
+/// From each point in time of a sequence to the next.
+fn time_steps(sequence: &SequenceInfo) -> Vec<usize> {
+    let times: BTreeSet<usize> = sequence.frames.iter().map(|frame| frame.time).collect();
+    times.iter().zip(times.iter().skip(1)).map(|(time, next)| next - time).collect()
 }
 
 /// The sequence of this id, which rows take from their subject.

@@ -17,10 +17,17 @@ pub struct FrameRecord {
     /// Seconds that it took. No result depends on them, and neither does equality.
     #[serde(default)]
     pub seconds: Seconds,
+    /// The widest angle between two joints that move one place of the body in the frame's pose, degrees, for charts; none where
+    /// nothing bends, and in records of earlier programs. No result depends on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bend: Option<f64>,
+    /// Bytes of the avatar's files, where they are known. No result depends on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bytes: Option<u64>,
 }
 
 impl PartialEq for FrameRecord {
-    /// Equal results: neither labels nor times count.
+    /// Equal results: neither labels nor times nor what else is beside the result count.
     fn eq(&self, other: &Self) -> bool {
         self.key == other.key && self.outcome == other.outcome
     }

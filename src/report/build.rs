@@ -104,7 +104,7 @@ fn measured(experiment: &Experiment, sequence: &SequenceResults, group: &Group, 
             let unfitted = members.iter().filter(|_| column.fitted).find_map(|variant| unfitted(variant));
             let note = match unfitted {
                 Some(why) => format!("n/c: {}, {}: {why}", sequence.label, group.label),
-                None => not_computed(column),
+                None => not_computed(column, &members),
             };
             cell.notes.push(notes.index(note));
         }
@@ -152,7 +152,16 @@ fn unfitted(variant: &VariantResults) -> Option<String> {
     ))
 }
 
-fn not_computed(column: &Column) -> String {
+/// Why a column has no number: of a metric of motion what its frames say, else what the metric needs.
+fn not_computed(column: &Column, variants: &[&VariantResults]) -> String {
+    if column.metric.needs_before() {
+        let summaries =
+            variants.iter().map(|variant| if column.fitted { &variant.fitted } else { &variant.summary });
+        let mut missing = summaries.flatten().filter_map(|summary| summary.not_computed.get(&column.metric));
+        let reason = missing.next();
+        let reason = reason.map_or("not asked for", String::as_str);
+        return format!("n/c: {} was computed for no frame ({reason})", column.title());
+    }
     let reason = match column.metric.metric().needs {
         "" => String::new(),
         needs => format!(" ({needs})"),
@@ -201,7 +210,8 @@ fn mean(
             cell.notes.push(notes.index(note));
         }
         if cell.content == Content::NotComputed {
-            cell.notes.push(notes.index(not_computed(column)));
+            let all: Vec<&VariantResults> = all().collect();
+            cell.notes.push(notes.index(not_computed(column, &all)));
         }
         cell
     };

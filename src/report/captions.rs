@@ -6,6 +6,7 @@ use crate::experiment::{
     Variant,
 };
 use skinsplat_data::Capture;
+use skinsplat_metrics::{MetricId, ROTATION_JUMP_DEGREES};
 use std::collections::BTreeSet;
 
 /// The table's caption: of its own data, or the stand-in's, which does not name that data.
@@ -50,6 +51,7 @@ pub(super) fn ran_on(
         sentences.push(format!("Mean ± standard deviation over the seeds {}", seeds.join(", ")));
     }
     sentences.extend(poses(experiment));
+    sentences.extend(motion(experiment));
     if !options.subset.is_everything() {
         sentences.push(subset(&options.subset));
     }
@@ -89,6 +91,29 @@ fn poses(experiment: &Experiment) -> Vec<String> {
         }
     }
     sentences
+}
+
+/// What columns of motion compare; nothing without such columns.
+fn motion(experiment: &Experiment) -> Option<String> {
+    let asks = |metric| experiment.columns.iter().any(|column| column.metric == metric);
+    let flicker = asks(MetricId::FLICKER).then(|| {
+        format!(
+            "{}: |(R - R') - (T - T')| of renders R and truths T, mean over channels and the pixels that the protocol scores in \
+             either frame, in 1/255",
+            MetricId::FLICKER.title()
+        )
+    });
+    let jumps = asks(MetricId::ROTATION_JUMPS).then(|| {
+        format!(
+            "{}: Gaussians that turn by over {ROTATION_JUMP_DEGREES} degrees more than the widest turn of any joint that they \
+             hang on",
+            MetricId::ROTATION_JUMPS.title()
+        )
+    });
+    let parts: Vec<String> = flicker.into_iter().chain(jumps).collect();
+    let between =
+        "Between a frame and the one before it by the same camera in the data's sequence, scored or not";
+    (!parts.is_empty()).then(|| format!("{between} (mean of frames that have one): {}", parts.join("; ")))
 }
 
 fn profile(profile: &Profile, experiment: &Experiment) -> String {

@@ -186,6 +186,10 @@ fn fit_into(
     let tests = Tests { sequences: tests, every, ssim: false };
     fitting::fit(training, &planned.options, name, files, tests, &mut |event| match event {
         FitEvent::Starting => Ok(()),
+        FitEvent::Took(part, seconds) => {
+            watch(Event::Took(part, seconds));
+            Ok(())
+        }
         FitEvent::Step(step) => {
             watch(Event::Fitting(step));
             Ok(())

@@ -9,7 +9,7 @@ use skinsplat_data::avatar::read_avatar;
 use skinsplat_fit::options::PoseFit;
 use skinsplat_fit::pose_fit::{FittedPose, Posable, Target, fit_pose};
 use skinsplat_fit::texture::{SAMPLES, TexturedBody};
-use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy};
+use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy, rotation_jumps};
 use skinsplat_render::View;
 use skinsplat_render::mesh::{Drawing, SamplePattern};
 use skinsplat_render::splat::Renderer;
@@ -232,6 +232,54 @@ impl Drawable<'_> {
         Ok(fit_pose(&posable, &target, view.pose, options)?)
     }
 }
+
+impl Drawable<'_> {
+    /// How many Gaussians' rotations jump from one view to another, beyond `margin` degrees ([`rotation_jumps`]).
+    ///
+    /// # Errors
+    /// What has no rotations: frames of another program, a mesh, Gaussians that a strategy deforms. Poses of another body.
+    pub(super) fn rotation_jumps(
+        &self,
+        before: &PosedView<'_>,
+        after: &PosedView<'_>,
+        strategy: Option<Strategy>,
+        margin: f64,
+    ) -> Result<u64, Error> {
+        let (Bound { avatar, body: own }, strategy) = self.turned_by(strategy)?;
+        let jumps = match own.as_deref() {
+            None => rotation_jumps(avatar, &before.body, &after.body, &strategy, margin)?,
+            Some(rest) => {
+                let [before, after] = [PosedBody::new(rest, before.pose)?, PosedBody::new(rest, after.pose)?];
+                rotation_jumps(avatar, &before, &after, &strategy, margin)?
+            }
+        };
+        jumps.ok_or(Error::NoRotations { of: UNTURNED })
+    }
+
+    /// The Gaussians that a strategy turns.
+    ///
+    /// # Errors
+    /// What has no rotations, as [`Drawable::rotation_jumps`] has it.
+    pub(super) fn turned_by(&self, strategy: Option<Strategy>) -> Result<(&Bound, Strategy), Error> {
+        let bound = match self {
+            Self::Gaussians(bound) | Self::Hybrid(bound, _) => &**bound,
+            Self::Textured(_) => return Err(Error::NoRotations { of: "a mesh has none" }),
+            Self::Renders(_) => {
+                return Err(Error::NoRotations {
+                    of: "those of frames that another program rendered are not known",
+                });
+            }
+        };
+        let strategy = strategy.ok_or(Error::NoStrategy)?;
+        match bound.avatar.is_turned_by(&strategy) {
+            true => Ok((bound, strategy)),
+            false => Err(Error::NoRotations { of: UNTURNED }),
+        }
+    }
+}
+
+/// Why Gaussians may have no rotations.
+const UNTURNED: &str = "the strategy deforms Gaussians and turns none";
 
 fn load_render(renders: &RenderedFrames, view: &PosedView<'_>, look: &Look<'_>) -> Result<Drawn, Error> {
     let image = renders::draw(renders, view.name, view.camera, view.stored, look.background)?;

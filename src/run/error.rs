@@ -58,6 +58,12 @@ pub enum Error {
     /// A pose that is to be fitted where none is read.
     #[error("fitted pose: the frame was not drawn from Gaussians; expected an avatar that a pose moves")]
     NoPoseToFit,
+    /// Rotations that are to be compared where there are none.
+    #[error("{of}")]
+    NoRotations {
+        /// What there is instead, in a few words.
+        of: &'static str,
+    },
     /// Noise on the poses of frames that another program rendered.
     #[error("pose_noise: the frame was rendered by another program; expected an avatar that a pose moves")]
     NoPoseToDisturb,

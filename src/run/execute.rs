@@ -1,20 +1,26 @@
 //! Executing jobs: one frame at a time, its truth loaded once, every variant posed, rendered and scored against it.
 
 use super::avatars::Workshop;
-use super::drawable::{Drawable, Drawn, Look, Scratch};
-use super::frame::{Frame, Scored, behind, check_background};
+use super::before::{FrameBefore, Seen};
+use super::drawable::{Drawable, Drawn, Scratch};
+use super::fitting::Part;
+use super::frame::{Frame, Scored, check_background};
+use super::looks::{look, noisy_pose};
+use super::sizes::bytes;
 use super::store::Store;
 use super::{Error, Library};
 use crate::experiment::{FittedOutcome, FrameRecord, Job, JobVariant, Outcome, Plan, Seconds};
 use rayon::prelude::*;
-use skinsplat_core::scene::Pose;
-use skinsplat_data::{Sequence, Truth};
+use skinsplat_data::Sequence;
 use skinsplat_fit::train::Step;
 use skinsplat_metrics::lpips::{NetworkSource, OneFrame};
 use skinsplat_metrics::{PerceptualDistance, Wanted};
+use skinsplat_posing::BendingJoints;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 /// What happened, for whoever watches.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +29,8 @@ pub enum Event {
     Avatars(usize),
     /// This one comes next.
     Avatar(String),
+    /// A part of its fit took so many seconds.
+    Took(Part, f64),
     /// An iteration of its fit is done.
     Fitting(Step),
     /// Something is wrong, but not fatally.
@@ -54,10 +62,13 @@ pub fn execute(
 ) -> Result<(), Error> {
     check(jobs, library)?;
     let avatars = prepare_avatars(plan, jobs, library, folder, watch)?;
+    let bending = bending(jobs, library)?;
+    let bytes = bytes(plan, folder);
+    let at_hand = AtHand { library, networks, avatars: &avatars, bending: &bending, bytes: &bytes };
     watch(Event::Frames(jobs.len()));
     let state = Mutex::new((store, Left::of(jobs)));
     by_frame(jobs).par_iter().try_for_each_init(Scratch::default, |scratch, group| {
-        let records = run_frame(group, library, networks, &avatars, scratch);
+        let records = run_frame(group, &at_hand, scratch);
         let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
         let (store, left) = &mut *state;
         store.append(&records)?;
@@ -142,34 +153,54 @@ fn by_frame(jobs: &[Job]) -> Vec<Vec<&Job>> {
     groups.into_values().collect()
 }
 
+/// What the frames of a run share.
+struct AtHand<'a> {
+    library: &'a Library,
+    networks: &'a dyn NetworkSource,
+    avatars: &'a Avatars,
+    /// By [`Job::sequence_name`].
+    bending: &'a BTreeMap<String, BendingJoints>,
+    /// Of the files of an avatar, by its key.
+    bytes: &'a BTreeMap<&'a str, u64>,
+}
+
+/// Which joints bend the body of each sequence.
+fn bending(jobs: &[Job], library: &Library) -> Result<BTreeMap<String, BendingJoints>, Error> {
+    let mut found = BTreeMap::new();
+    for job in jobs {
+        if let Entry::Vacant(entry) = found.entry(job.sequence_name()) {
+            let sequence = library.sequence(&job.dataset, &job.subject, &job.sequence)?;
+            entry.insert(BendingJoints::of(&sequence.body));
+        }
+    }
+    Ok(found)
+}
+
 /// The records of all jobs of one frame.
-fn run_frame(
-    jobs: &[&Job],
-    library: &Library,
-    networks: &dyn NetworkSource,
-    avatars: &Avatars,
-    scratch: &mut Scratch,
-) -> Vec<FrameRecord> {
+fn run_frame(jobs: &[&Job], at_hand: &AtHand<'_>, scratch: &mut Scratch) -> Vec<FrameRecord> {
+    let AtHand { library, networks, avatars, bending, bytes } = *at_hand;
     let first = jobs[0];
     let sequence = test_sequence(first, library);
     let frame = sequence
         .as_ref()
         .map_err(ToString::to_string)
         .and_then(|sequence| Frame::load(sequence, first.frame, None).map_err(|error| error.to_string()));
+    let joints = bending.get(&first.sequence_name());
+    let bend = joints.zip(frame.as_ref().ok()).and_then(|(joints, frame)| joints.widest(&frame.view.body));
     let distances = OneFrame::new(networks);
     let mut records = Vec::new();
     for job in jobs {
         for variant in &job.variants {
             let outcome = frame.as_ref().map_err(Clone::clone).and_then(|frame| {
-                let noisy = noisy_pose(variant, sequence.as_ref().ok(), first.frame);
                 let avatar = &avatars[&variant.avatar];
-                run_variant(job, variant, (frame, noisy), avatar, &distances, scratch)
+                run_variant(job, variant, frame, avatar, &distances, scratch)
                     .map_err(|error| error.to_string())
             });
             let (outcome, seconds) =
                 outcome.unwrap_or_else(|problem| (Outcome::Error(problem), Seconds::default()));
             let (key, label) = (variant.key.clone(), job.label(variant));
-            records.push(FrameRecord { key, label, outcome, seconds });
+            let bytes = bytes.get(variant.avatar.as_str()).copied();
+            records.push(FrameRecord { key, label, outcome, seconds, bend, bytes });
         }
     }
     records
@@ -181,45 +212,46 @@ pub(super) fn test_sequence(job: &Job, library: &Library) -> Result<Sequence, Er
     Ok(job.resolution.map_or_else(|| sequence.clone(), |side| sequence.reduced(side)))
 }
 
-/// How a variant of a job is drawn where its truth is this one.
-pub(super) fn look<'a>(job: &Job, variant: &JobVariant, truth: &'a Truth) -> Result<Look<'a>, Error> {
-    let background = behind(&job.protocol, truth)?;
-    Ok(Look { strategy: variant.strategy, background, antialiased: job.antialiased })
-}
-
-/// The pose of a frame with the variant's noise, if it has any.
-pub(super) fn noisy_pose(variant: &JobVariant, sequence: Option<&Sequence>, frame: usize) -> Option<Pose> {
-    let (noise, sequence) = (variant.noise?, sequence?);
-    Some(sequence.noisy_pose(sequence.frames[frame].pose, noise.degrees, noise.seed))
-}
-
 fn run_variant(
     job: &Job,
     variant: &JobVariant,
-    (frame, noisy): (&Frame<'_>, Option<Pose>),
+    frame: &Frame<'_>,
     avatar: &Built,
     distances: &dyn PerceptualDistance,
     scratch: &mut Scratch,
 ) -> Result<(Outcome, Seconds), Error> {
     let avatar = avatar.as_ref().map_err(|problem| Error::Avatar { problem: problem.clone() })?;
     let wanted = Wanted { lpips: Some(distances), ..Wanted::of(&job.metrics) };
+    let noisy = noisy_pose(variant, frame.place.0, frame.place.1);
     if noisy.is_some() && matches!(avatar, Drawable::Renders(_)) {
         return Err(Error::NoPoseToDisturb);
     }
     let noisy_view = noisy.as_ref().map(|pose| frame.in_pose(pose)).transpose()?;
     let view = noisy_view.as_ref().unwrap_or(&frame.view);
     let look = look(job, variant, &frame.truth)?;
+    let start = Instant::now();
+    let before = FrameBefore::of(Seen { job, variant, avatar, view }, frame, scratch);
+    let before_seconds = start.elapsed().as_secs_f64();
     let Scored { score, drawn, score_seconds } =
-        frame.evaluate_view(view, avatar, &look, &job.protocol, wanted, scratch)?;
+        frame.evaluate_view(view, avatar, &look, &job.protocol, before.wanted(wanted), scratch)?;
     let fitted = variant.fitted.as_ref().map(|options| {
         let fitted = avatar.fit_pose(view, &frame.truth, &look, options).and_then(|found| {
             let view = frame.in_pose(&found.pose)?;
-            let scored = frame.evaluate_view(&view, avatar, &look, &job.protocol, wanted, scratch)?;
+            let scored =
+                frame.evaluate_view(&view, avatar, &look, &job.protocol, unfitted(wanted), scratch)?;
             Ok(FittedOutcome::Scored { score: scored.score, turned_degrees: found.turned_degrees })
         });
         fitted.unwrap_or_else(|error| FittedOutcome::Failed(error.to_string()))
     });
     let Drawn { visible_splats, pose_seconds, render_seconds, .. } = drawn;
-    let seconds = Seconds { pose: pose_seconds, render: render_seconds, score: score_seconds };
+    // Whatever is drawn in order to score is part of scoring.
+    let seconds =
+        Seconds { pose: pose_seconds, render: render_seconds, score: before_seconds + score_seconds };
     Ok((Outcome::Scored { score, visible_splats, fitted }, seconds))
+}
+
+/// What is wanted of a frame whose pose was fitted: that of the frame before was not.
+fn unfitted(wanted: Wanted<'_>) -> Wanted<'_> {
+    let why = "its pose was not fitted";
+    Wanted { before: Err(why), rotation_jumps: Err(why), ..wanted }
 }

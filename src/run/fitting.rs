@@ -107,10 +107,21 @@ impl Tests<'_> {
     }
 }
 
+/// A part of a fit beside its iterations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The avatar with which it starts.
+    Start,
+    /// Scores on the way, on frames that it does not see.
+    Curve,
+}
+
 /// What is said while a fit goes on.
 pub enum FitEvent<'a> {
     /// The avatar with which it starts is being made.
     Starting,
+    /// A part of it took so many seconds.
+    Took(Part, f64),
     /// An iteration is done.
     Step(Step),
     /// Something is wrong with the data, but not fatally.
@@ -144,7 +155,8 @@ pub fn fit(
     };
     iterate(&mut trainer, options, tests, &path, &mut progress, watch)?;
     write_avatar(&trainer, files, sequence)?;
-    progress.held_out.extend(score_end(&trainer, files, sequence, options, tests)?);
+    let end = timed(Part::Curve, watch, || score_end(&trainer, files, sequence, options, tests))?;
+    progress.held_out.extend(end);
     let report = progress.report(&trainer, trained_on, sequence, options);
     write_report(&files.sidecar(), &report)?;
     cache::remove(&path)?;
@@ -153,6 +165,14 @@ pub fn fit(
 
 /// Whoever watches a fit.
 type Watch<'w> = dyn FnMut(FitEvent<'_>) -> Result<(), Error> + 'w;
+
+/// Does a part of a fit, and says how long that took.
+fn timed<T>(part: Part, watch: &mut Watch<'_>, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    let start = Instant::now();
+    let done = work()?;
+    watch(FitEvent::Took(part, start.elapsed().as_secs_f64()))?;
+    Ok(done)
+}
 
 /// The trainer before its first iteration.
 fn started<'a>(
@@ -164,13 +184,15 @@ fn started<'a>(
     watch: &mut Watch<'_>,
 ) -> Result<Trainer<'a>, Error> {
     watch(FitEvent::Starting)?;
+    let begun = Instant::now();
     let Started { avatar, warnings } = start(sequence, options, files, watch)?;
+    watch(FitEvent::Took(Part::Start, begun.elapsed().as_secs_f64()))?;
     for warning in warnings {
         progress.note_warning(warning, watch)?;
     }
     let trainer = Trainer::new(sequence, options, avatar)?;
     if tests.are_due(0, options.iterations) {
-        progress.held_out = tests.score(trainer.fitted(), options, 0)?;
+        progress.held_out = timed(Part::Curve, watch, || tests.score(trainer.fitted(), options, 0))?;
     }
     Ok(trainer)
 }
@@ -193,7 +215,8 @@ fn iterate(
         progress.note(step);
         watch(FitEvent::Step(step))?;
         if tests.are_due(step.iteration, options.iterations) {
-            progress.held_out.extend(tests.score(trainer.fitted(), options, step.iteration)?);
+            let scores = || tests.score(trainer.fitted(), options, step.iteration);
+            progress.held_out.extend(timed(Part::Curve, watch, scores)?);
         }
         if trainer.is_resting() && saved.elapsed() > BETWEEN_CHECKPOINTS {
             progress.save(checkpoint, trainer.checkpoint()?)?;

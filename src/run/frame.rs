@@ -14,8 +14,12 @@ use std::time::Instant;
 pub(super) struct Frame<'a> {
     pub(super) truth: Truth,
     pub(super) view: PosedView<'a>,
+    /// Its sequence, and which of its frames it is.
+    pub(super) place: (&'a Sequence, usize),
     /// [`Wanted::bend`], once somebody asks.
     bend: OnceLock<Vec<f32>>,
+    /// [`Frame::before`], once somebody asks.
+    before: OnceLock<Result<Box<Frame<'a>>, String>>,
 }
 
 /// What came of a drawing and its comparison with the truth.
@@ -44,7 +48,23 @@ impl<'a> Frame<'a> {
         };
         let (name, stored) = (frame.name.as_str(), sequence.stored_size(frame.camera));
         let view = PosedView { pose, camera, body, name, stored };
-        Ok(Self { truth, view, bend: OnceLock::new() })
+        let (bend, before) = (OnceLock::new(), OnceLock::new());
+        Ok(Self { truth, view, place: (sequence, index), bend, before })
+    }
+
+    /// The frame before it in the data's sequence ([`Sequence::before`]), whether it is scored or not, or why there is none.
+    pub(super) fn before(&self) -> Result<&Self, &str> {
+        let load = || {
+            let (sequence, index) = self.place;
+            let before = sequence.before(index).ok_or("none by this camera")?;
+            Self::load(sequence, before, None).map(Box::new).map_err(|error| error.to_string())
+        };
+        self.before.get_or_init(load).as_deref().map_err(String::as_str)
+    }
+
+    /// The truth as metrics see it.
+    pub(super) fn straight_truth(&self) -> skinsplat_metrics::Truth<'_> {
+        skinsplat_metrics::Truth::Straight { rgb: &self.truth.rgb, alpha: &self.truth.alpha }
     }
 
     /// The view of the frame in another pose.

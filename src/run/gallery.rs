@@ -4,8 +4,9 @@
 //! its absolute error, four times enlarged.
 
 use super::drawable::{Behind, Scratch};
-use super::execute::{look, noisy_pose, prepare_avatars, test_sequence};
+use super::execute::{prepare_avatars, test_sequence};
 use super::frame::{Frame, behind};
+use super::looks::{look, noisy_pose};
 use super::{Error, Event, Library};
 use crate::experiment::{Job, Outcome, Plan, Records};
 use skinsplat_core::scene::{Image, Mask, SceneError};
@@ -50,7 +51,7 @@ pub fn write(
             let avatar = avatars[&variant.avatar]
                 .as_ref()
                 .map_err(|problem| Error::Avatar { problem: problem.clone() })?;
-            let noisy = noisy_pose(variant, Some(&sequence), job.frame);
+            let noisy = noisy_pose(variant, &sequence, job.frame);
             let noisy_view = noisy.as_ref().map(|pose| frame.in_pose(pose)).transpose()?;
             let view = noisy_view.as_ref().unwrap_or(&frame.view);
             images.push(avatar.draw(view, &look(job, variant, &frame.truth)?, &mut scratch)?.image);

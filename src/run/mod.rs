@@ -6,10 +6,12 @@
 //! draws them in poses that no frame has.
 //!
 //! Each file imports only from those before it in this list: `textured`, `foreign`, `drawable`, `library`, `frame`,
-//! `held_out`, `cache`, `refined_poses`, `fitting`, `curve_frames`, `avatars`, `execute`, `gallery`, `pictures`, `motion`.
+//! `looks`, `before`, `held_out`, `cache`, `refined_poses`, `fitting`, `curve_frames`, `avatars`, `sizes`, `execute`, `costs`, `gallery`, `pictures`, `motion`.
 
 mod avatars;
+mod before;
 pub mod cache;
+pub mod costs;
 mod curve_frames;
 pub mod curves;
 pub mod drawable;
@@ -23,6 +25,7 @@ mod frame;
 pub mod gallery;
 pub mod held_out;
 mod library;
+mod looks;
 mod machine;
 pub mod merge;
 pub mod motion;
@@ -31,6 +34,7 @@ pub mod plan_file;
 pub mod provenance;
 mod refined_poses;
 pub mod renders;
+mod sizes;
 pub mod store;
 pub mod textured;
 

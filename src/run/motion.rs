@@ -5,8 +5,9 @@
 //! in the first test frame of the row, turned and scaled as there, and the camera of that frame looks on.
 
 use super::drawable::{Drawable, PosedView, Scratch};
-use super::execute::{look, prepare_avatars, test_sequence};
+use super::execute::{prepare_avatars, test_sequence};
 use super::frame::Frame;
+use super::looks::look;
 use super::{Error, Event, Library};
 use crate::experiment::{AvatarSource, Job, JobVariant, Plan, PlannedTable};
 use glam::{DAffine3, DQuat, DVec3};

@@ -2,9 +2,10 @@
 //! the subject, and of every sequence a moving picture, variants side by side.
 
 use super::drawable::{Behind, Scratch};
-use super::execute::{Avatars, look, prepare_avatars, test_sequence};
+use super::execute::{Avatars, prepare_avatars, test_sequence};
 use super::frame::{Frame, behind};
 use super::gallery::{crop, picture_name, scored, spread};
+use super::looks::look;
 use super::{Error, Event, Library};
 use crate::experiment::{Job, Plan, Records};
 use image::RgbImage;

@@ -1,5 +1,6 @@
 //! Who computed a result, when and with what: kept apart from results, which depend on none of it.
 
+use super::fitting::Part;
 use super::{Event, Machine};
 use crate::experiment::{CodeVersions, Plan};
 use serde::{Deserialize, Serialize};
@@ -54,8 +55,22 @@ pub struct Phases {
     pub plan: f64,
     /// Making or reading the avatars, one after another.
     pub avatars: Vec<(String, f64)>,
+    /// Of each of them the parts of its fit, zeros where it was not fitted; nothing in files of earlier programs.
+    #[serde(default)]
+    pub fits: Vec<FitParts>,
     /// Drawing and scoring the frames.
     pub frames: f64,
+}
+
+/// Wall-clock seconds of the parts of a fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FitParts {
+    /// Making or reading the avatar with which it starts.
+    pub start: f64,
+    /// Its iterations, and what is written.
+    pub iterations: f64,
+    /// Scores on the way, on frames that it does not see.
+    pub curve: f64,
 }
 
 /// Notes when the parts of a run begin and end.
@@ -68,6 +83,9 @@ struct Laps {
     avatar: Option<String>,
     /// Seconds of the frames of tables that are done.
     frames: f64,
+    parts: FitParts,
+    /// An iteration was seen.
+    fitted: bool,
     phases: Phases,
 }
 
@@ -75,7 +93,14 @@ impl Stopwatch {
     /// Running, after a plan that took so many seconds.
     pub fn after_planning(seconds: f64) -> Self {
         let phases = Phases { plan: seconds, ..Phases::default() };
-        Self(Mutex::new(Laps { since: Instant::now(), avatar: None, frames: 0.0, phases }))
+        Self(Mutex::new(Laps {
+            since: Instant::now(),
+            avatar: None,
+            parts: FitParts::default(),
+            fitted: false,
+            frames: 0.0,
+            phases,
+        }))
     }
 
     /// Sees an event of the run.
@@ -85,11 +110,20 @@ impl Stopwatch {
             Event::Avatar(label) => {
                 laps.since = Instant::now();
                 laps.avatar = Some(label.clone());
+                (laps.parts, laps.fitted) = (FitParts::default(), false);
             }
+            Event::Took(Part::Start, seconds) => laps.parts.start += seconds,
+            Event::Took(Part::Curve, seconds) => laps.parts.curve += seconds,
+            Event::Fitting(_) => laps.fitted = true,
             Event::AvatarReady => {
                 let seconds = laps.since.elapsed().as_secs_f64();
                 if let Some(label) = laps.avatar.take() {
                     laps.phases.avatars.push((label, seconds));
+                    let mut parts = laps.parts;
+                    if laps.fitted {
+                        parts.iterations = (seconds - parts.start - parts.curve).max(0.0);
+                    }
+                    laps.phases.fits.push(parts);
                 }
             }
             Event::Frames(_) => {

@@ -41,6 +41,7 @@ mod scoring;
 mod scoring_inputs;
 mod streams;
 mod stressing;
+mod temporal;
 mod usage;
 mod viewing;
 mod widths;

@@ -231,6 +231,47 @@ fn a_run_says_what_made_it_and_how_long_that_took() {
     assert!(timing.contains("Where the time went") && timing.contains("| Skinned | "), "{timing}");
 }
 
+/// A fit says what its start, its iterations and its curve took, which is all of its time; an avatar how large it is.
+#[test]
+fn the_parts_of_a_fit_and_the_bytes_of_an_avatar_are_told() {
+    let desk = Desk::new();
+    desk.put("small.toml", include_str!("small.toml"));
+    let all =
+        args!["-q", "run", "small.toml", "--data", data("small"), "--fit-iterations", "2", "--out", "run"];
+    desk.ok([all, args!["--html", "page.html"]].concat());
+    let run: Value = serde_json::from_str(&desk.read("run/run.json")).unwrap();
+    let (avatars, fits) = (&run["phases"]["avatars"], run["phases"]["fits"].as_array().unwrap());
+    let part = |i: usize, part: &str| fits[i][part].as_f64().unwrap();
+    for i in 0..2 {
+        let fitted = avatars[i][0].as_str().unwrap().contains("hugs-skinned");
+        let sum: f64 = ["start", "iterations", "curve"].map(|name| part(i, name)).iter().sum();
+        assert_eq!(sum > 0.0, fitted, "{run}");
+        if fitted {
+            assert!((sum - avatars[i][1].as_f64().unwrap()).abs() < 1e-9, "{run}");
+            assert!(part(i, "start") > 0.0 && part(i, "iterations") > 0.0 && part(i, "curve") > 0.0, "{run}");
+        }
+    }
+    let timing = desk.ok(args!["report", "run", "--timing"]);
+    assert!(timing.contains("| all avatars |") && timing.contains("Start, s"), "{timing}");
+    // The surface avatar is one file; the start of a fit is another, and no avatar of the table.
+    let kept = std::fs::read_dir(desk.path("run/avatars")).unwrap().map(|entry| entry.unwrap().path());
+    let made = kept.filter(|path| path.extension().is_some_and(|kind| kind == "ply"));
+    let bytes: Vec<u64> = made.map(|path| std::fs::metadata(path).unwrap().len()).collect();
+    let page = desk.read("page.html");
+    let records = desk.read("run/frames.jsonl");
+    let known = bytes.iter().filter(|bytes| records.contains(&format!("\"bytes\":{bytes}"))).count();
+    assert!(known >= 2, "{bytes:?} {records}");
+    assert!(page.contains("Bytes") && page.contains("over bend"));
+    assert!(page.contains("the median of 5 repeats, variants in alternating order"), "{page}");
+    let costs: Value = serde_json::from_str(&desk.read("run/costs.json")).unwrap();
+    let drawn = costs["variants"].as_array().unwrap();
+    assert!(drawn.len() == 2 && drawn.iter().all(|cost| cost["draw"].as_f64().unwrap() > 0.0), "{costs}");
+    // Those of another plan are not this run's.
+    desk.put("run/costs.json", desk.read("run/costs.json").replacen("\"plan\": \"", "\"plan\": \"0", 1));
+    desk.ok(args!["report", "run", "--format", "html", "--out", "again.html"]);
+    assert!(desk.read("again.html").contains("Times were taken once per frame"));
+}
+
 /// One file, whose tables, charts and pictures are there, and that says what is not.
 #[test]
 fn a_run_is_one_page() {

@@ -105,7 +105,8 @@ pub(super) fn score(protocol: &str, psnr: f64, ssim: f64, lpips: Option<f64>) ->
 }
 
 pub(super) fn record(key: &str, outcome: Outcome) -> FrameRecord {
-    FrameRecord { key: key.into(), label: format!("label of {key}"), outcome, seconds: Seconds::default() }
+    let (label, seconds) = (format!("label of {key}"), Seconds::default());
+    FrameRecord { key: key.into(), label, outcome, seconds, bend: None, bytes: None }
 }
 
 pub(super) fn scored(key: &str, score: FrameScore) -> FrameRecord {

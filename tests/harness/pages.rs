@@ -2,8 +2,10 @@
 
 use super::made_up::{results, run, table_7};
 use image::{Rgb, RgbImage};
-use skinsplat::report::Results;
-use skinsplat::report::html::{Extras, KeptPictures, Stills, frames_that_fit, html};
+use skinsplat::report::html::{BOUND, Extras, KeptPictures, Stills, frames_that_fit, html};
+use skinsplat::report::{FrameResult, Results};
+use std::collections::BTreeMap;
+use std::time::Instant;
 
 /// A picture that no codec makes small.
 fn noise(seed: u32) -> RgbImage {
@@ -46,4 +48,66 @@ fn as_many_frames_are_read_as_a_page_can_show() {
     // Where everything fits, everything is read.
     assert_eq!(frames_that_fit(&results, &extras(8, 10), 10), 10);
     assert!(!html(&results, &extras(8, 8)).contains("Pictures of"));
+}
+
+/// Points lead to pictures that are there; of others they say why not, and over the bend as over frames.
+#[test]
+fn points_lead_to_pictures_that_the_page_has() {
+    let results = results(&table_7(), run);
+    let stills = stills(&results, 1);
+    let sequence = &results.tables[0].sequences[0];
+    let frames = &sequence.variants[0].frames;
+    let bends =
+        frames.iter().zip(0..).map(|(frame, k)| (frame.key.clone(), 30.0 + 5.0 * f64::from(k))).collect();
+    let name = |frame: &str| [stills[0].table.clone(), stills[0].sequence.clone(), frame.to_owned()];
+    let unread = vec![name(&frames[1].name)];
+    let first = Stills { frame: frames[0].name.clone(), ..stills.into_iter().next().unwrap() };
+    let pictures = KeptPictures { stills: vec![first], kept: 2, unread, ..KeptPictures::default() };
+    let page = html(&results, &Extras { pictures, bends, bound: 400_000, ..Extras::default() });
+    for view in ["over frames", "over bend"] {
+        assert!(page.contains(&format!("data-view=\"{view}\"")), "{view}");
+    }
+    assert!(page.contains("widest angle between joints"));
+    let link = format!("data-frame=\"{}\"", frames[0].name);
+    assert!(page.matches(&link).count() >= 2, "in both views");
+    assert!(!page.contains(&format!("data-frame=\"{}\"", frames[1].name)), "it would lead nowhere");
+    assert!(page.contains("its picture was left out to keep the page small"));
+    let plain = html(&results, &Extras { bound: 400_000, ..Extras::default() });
+    assert!(
+        !plain.contains("over bend") && !plain.contains("its picture"),
+        "nothing is known, nothing was kept"
+    );
+}
+
+/// Sequences of thousands of frames: the page is small, quickly made, and says that it draws one frame in so many.
+#[test]
+fn ten_thousand_frames_are_one_page() {
+    const FRAMES: usize = 10_000;
+    let mut results = results(&table_7(), run);
+    let (mut bends, mut unread) = (BTreeMap::new(), Vec::new());
+    let table = &mut results.tables[0];
+    let sequence = &mut table.sequences[0];
+    for (v, variant) in sequence.variants.iter_mut().enumerate() {
+        let model = variant.frames[0].clone();
+        let frame = |k: usize| FrameResult {
+            frame: k,
+            name: format!("image_{k:05}"),
+            key: format!("{v}/{k}"),
+            ..model.clone()
+        };
+        variant.frames = (0..FRAMES).map(frame).collect();
+        bends.extend(variant.frames.iter().map(|frame| (frame.key.clone(), frame.frame as f64 % 150.0)));
+    }
+    for frame in &sequence.variants[0].frames {
+        unread.push([table.experiment.clone(), sequence.id.clone(), frame.name.clone()]);
+    }
+    let pictures = KeptPictures { kept: FRAMES, unread, ..KeptPictures::default() };
+    let start = Instant::now();
+    let page = html(&results, &Extras { pictures, bends, bound: BOUND, ..Extras::default() });
+    eprintln!("{FRAMES} frames: {} bytes in {:.2} s", page.len(), start.elapsed().as_secs_f64());
+    assert!(page.len() < 3_000_000 && page.len() < BOUND, "{} bytes", page.len());
+    for every in ["One frame in 7 is drawn.", "One frame in 34 is drawn."] {
+        assert!(page.contains(every), "{every}");
+    }
+    assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
 }

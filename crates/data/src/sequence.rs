@@ -236,6 +236,18 @@ impl Sequence {
         Ok(self.stored_truth(source, stored)?.reduced([wanted.width, wanted.height]))
     }
 
+    /// The frame before a frame: the latest earlier one that the same camera took (one that stands and looks the same, if each
+    /// frame has its own), the first listed of several. None for the first, and where the camera moves.
+    pub fn before(&self, frame: usize) -> Option<usize> {
+        let FrameRef { time, camera, .. } = self.frames.get(frame)?;
+        let same = |other: usize| other == *camera || self.cameras[other] == self.cameras[*camera];
+        let earlier = self.frames.iter().enumerate().filter(|(_, other)| other.time < *time);
+        // Of equal times `max_by_key` takes the last.
+        let latest =
+            earlier.rev().filter(|(_, other)| same(other.camera)).max_by_key(|(_, other)| other.time);
+        latest.map(|(index, _)| index)
+    }
+
     /// Width and height of the images of a camera as they are stored.
     pub fn stored_size(&self, camera: usize) -> [u32; 2] {
         let seen = || [self.cameras[camera].width, self.cameras[camera].height];
@@ -284,4 +296,62 @@ fn check_size(path: &Path, field: &str, found: (usize, usize), camera: (usize, u
     }
     let expected = format!("the camera's {}x{}", camera.0, camera.1);
     Err(Error::invalid(path, format!("{field} size"), format!("{}x{}", found.0, found.1), expected))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DMat4, DVec3};
+    use skinsplat_core::scene::{Skeleton, SkinWeights};
+
+    /// Frames of times and cameras. The cameras 0 and 2 are equal.
+    fn sequence(frames: &[(usize, usize)]) -> Sequence {
+        let names = vec!["root".to_owned()];
+        let skeleton = Skeleton::from_joint_positions(names, vec![None], &[DVec3::ZERO]).unwrap();
+        let rest = Pose::rest(&skeleton);
+        let weights = SkinWeights::from_rows([[(0, 1.0)]], 1).unwrap();
+        let (vertices, faces) = (vec![DVec3::X], Vec::new());
+        let body = RestBody { skeleton, vertices, faces, weights, uv: None, pose_directions: Vec::new() };
+        let camera = |cx: f64| Camera {
+            width: 8,
+            height: 4,
+            fx: 9.0,
+            fy: 9.0,
+            cx,
+            cy: 2.0,
+            camera_from_world: DMat4::IDENTITY,
+        };
+        let source = |image: String| {
+            FrameSource::Files(FrameFiles { image: image.into(), mask: None, background: None })
+        };
+        let frame = |&(time, camera): &(usize, usize)| {
+            let name = format!("{camera}/{time}");
+            FrameRef { source: source(name.clone()), name, time, pose: 0, camera }
+        };
+        Sequence {
+            id: "test".into(),
+            body: Arc::new(body),
+            poses: vec![rest].into(),
+            cameras: [4.0, 3.0, 4.0].map(camera).to_vec().into(),
+            frames: frames.iter().map(frame).collect(),
+            stored_sizes: None,
+        }
+    }
+
+    #[test]
+    fn the_frame_before_is_the_latest_earlier_one_of_the_camera() {
+        let before = |frames: &[(usize, usize)]| {
+            let sequence = sequence(frames);
+            (0..frames.len()).map(|frame| sequence.before(frame)).collect::<Vec<_>>()
+        };
+        let by_time = before(&[(0, 0), (0, 1), (4, 0), (4, 1), (5, 1)]);
+        assert_eq!(by_time, [None, None, Some(0), Some(1), Some(3)]);
+        assert_eq!(before(&[(7, 0), (3, 0), (5, 0), (5, 0)]), [Some(2), None, Some(1), Some(1)], "any order");
+        assert_eq!(
+            before(&[(0, 0), (1, 1), (2, 2)]),
+            [None, None, Some(0)],
+            "a camera that moved, one that did not"
+        );
+        assert_eq!(sequence(&[]).before(0), None);
+    }
 }

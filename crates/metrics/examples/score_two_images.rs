@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn score(protocol: &Protocol, render: &Image, truth: &Image) -> Result<FrameScore, MetricsError> {
     use skinsplat_metrics::lpips::{OneFrame, weights::Networks};
     let networks = Networks::default();
-    let metrics: Vec<MetricId> = MetricId::of_frames().collect();
+    let metrics: Vec<MetricId> = MetricId::of_images().collect();
     let wanted = Wanted { lpips: Some(&OneFrame::new(&networks)), ..Wanted::of(&metrics) };
     protocol.score_with(render, Truth::Composited { rgb: truth, mask: None }, wanted)
 }
@@ -45,7 +45,7 @@ fn score(protocol: &Protocol, render: &Image, truth: &Image) -> Result<FrameScor
 /// Every metric of two images; LPIPS is asked for and says why it is not there.
 #[cfg(not(feature = "alex"))]
 fn score(protocol: &Protocol, render: &Image, truth: &Image) -> Result<FrameScore, MetricsError> {
-    let metrics: Vec<MetricId> = MetricId::of_frames().collect();
+    let metrics: Vec<MetricId> = MetricId::of_images().collect();
     protocol.score_with(render, Truth::Composited { rgb: truth, mask: None }, Wanted::of(&metrics))
 }
 

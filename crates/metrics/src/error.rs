@@ -67,6 +67,16 @@ pub enum MetricsError {
         /// Pixels of the images.
         pixels: usize,
     },
+    /// A metric of motion, and nothing is known of the frame before.
+    NoFrameBefore {
+        /// Why, in a few words.
+        why: String,
+    },
+    /// Rotations whose jumps nobody can count.
+    NoRotations {
+        /// Why, in a few words.
+        why: String,
+    },
     /// A region needs a mask and none was given.
     NoMask {
         /// The region.
@@ -156,6 +166,14 @@ impl fmt::Display for MetricsError {
             Self::BendSize { values, pixels } => {
                 ("bend", format!("{values} values"), format!("one per pixel, {pixels}"))
             }
+            Self::NoFrameBefore { why } => {
+                ("frame before", why.clone(), "one that the same camera took".into())
+            }
+            Self::NoRotations { why } => (
+                "rotations",
+                why.clone(),
+                "Gaussians that a strategy turns from one frame to the next".into(),
+            ),
             Self::NoMask { region } => ("mask", "none given".into(), format!("one, for region \"{region}\"")),
             Self::EmptyRegion { region, threshold, largest } => (
                 "mask",

@@ -5,6 +5,7 @@ pub mod aggregate;
 pub mod error;
 pub mod lpips;
 pub mod metric;
+pub mod motion;
 pub mod planes;
 pub mod protocol;
 pub mod psnr;
@@ -16,7 +17,11 @@ pub mod variants;
 pub use aggregate::{Aggregation, Summary};
 pub use error::MetricsError;
 pub use lpips::{InputRange, LpipsNet, LpipsVariant, PerceptualDistance};
-pub use metric::{AvatarStats, FrameInput, METRICS, Measure, Measured, Metric, MetricId, OverFrames, Values};
+pub use metric::{
+    AvatarStats, FrameInput, METRICS, Measure, Measured, Metric, MetricId, OverFrames, ROTATION_JUMP_DEGREES,
+    Values,
+};
+pub use motion::Before;
 pub use planes::Planes;
 pub use protocol::{Background, Clamp, PROTOCOLS, Protocol, ProtocolId, Quantisation};
 pub use psnr::{ErrorSums, PsnrVariant};

@@ -3,7 +3,7 @@
 use super::planes::{check_mask, exact_level};
 use super::region::{bounding_box, empty, inside};
 use super::{
-    AvatarStats, Background, ErrorSums, FrameInput, Measure, Measured, MetricId, MetricsError,
+    AvatarStats, Background, Before, ErrorSums, FrameInput, Measure, Measured, MetricId, MetricsError,
     PerceptualDistance, Planes, Protocol, ProtocolId, Region, Values,
 };
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ impl<'a> Truth<'a> {
         }
     }
 
-    fn mask(&self) -> Option<&'a Mask> {
+    pub(crate) fn mask(&self) -> Option<&'a Mask> {
         match self {
             Self::Straight { alpha, .. } => Some(alpha),
             Self::Composited { mask, .. } => *mask,
@@ -94,12 +94,25 @@ pub struct Wanted<'a> {
     /// By how much the body is bent where a pixel shows it: the widest angle between the joints that move the surface there,
     /// degrees, row by row; negative where there is no body. Metrics of bent pixels need it.
     pub bend: Option<&'a [f32]>,
+    /// The frame before, for metrics of motion, or why there is none.
+    pub before: Result<Before<'a>, &'a str>,
+    /// Gaussians whose rotation jumped since the frame before ([`ROTATION_JUMP_DEGREES`](crate::ROTATION_JUMP_DEGREES)), or
+    /// why nobody counted them.
+    pub rotation_jumps: Result<u64, &'a str>,
 }
 
 impl<'a> Wanted<'a> {
     /// Metrics of two images, without LPIPS.
     pub fn of(metrics: &'a [MetricId]) -> Self {
-        Self { metrics, lpips: None, avatar: AvatarStats::default(), bend: None }
+        let unknown = "nobody said what it was";
+        Self {
+            metrics,
+            lpips: None,
+            avatar: AvatarStats::default(),
+            bend: None,
+            before: Err(unknown),
+            rotation_jumps: Err(unknown),
+        }
     }
 }
 
@@ -151,7 +164,21 @@ impl Protocol {
             values: Values::default(),
             not_computed: BTreeMap::new(),
         };
-        let frame = FrameInput { protocol: self, images: &images, errors: &errors, lpips: wanted.lpips };
+        let succession = match wanted.before {
+            Ok(before) if wanted.metrics.contains(&MetricId::FLICKER) => {
+                Ok(self.succession(render, truth, before)?)
+            }
+            Ok(_) => Err("nobody asked"),
+            Err(why) => Err(why),
+        };
+        let frame = FrameInput {
+            protocol: self,
+            images: &images,
+            errors: &errors,
+            lpips: wanted.lpips,
+            succession: succession.as_ref().map_err(|why| *why),
+            rotation_jumps: wanted.rotation_jumps,
+        };
         for &id in wanted.metrics {
             match id.metric().measure {
                 Measure::Avatar(of) => score.note(id, of(&wanted.avatar).map(Measured::Value)),
@@ -176,6 +203,12 @@ impl Protocol {
         truth: Truth<'_>,
         bend: Option<&[f32]>,
     ) -> Result<Prepared, MetricsError> {
+        let [render, rgb] = self.finished(render, truth)?;
+        self.cut(render, rgb, truth.mask(), bend)
+    }
+
+    /// Render and truth, composited, clamped and quantised, before anything is cut out.
+    pub(crate) fn finished(&self, render: &Image, truth: Truth<'_>) -> Result<[Planes; 2], MetricsError> {
         let size = (render.width(), render.height());
         let rgb = truth.rgb();
         MetricsError::check_size("truth", (rgb.width(), rgb.height()), size)?;
@@ -206,7 +239,7 @@ impl Protocol {
             }
             finish(y, rgb);
         })?;
-        self.cut(render, rgb, truth.mask(), bend)
+        Ok([render, rgb])
     }
 
     /// How the region changes pixels.
@@ -229,7 +262,7 @@ impl Protocol {
     }
 
     /// Crops to the region, or adds its weights.
-    fn cut(
+    pub(crate) fn cut(
         &self,
         render: Planes,
         truth: Planes,
@@ -464,7 +497,8 @@ mod tests {
     fn without_a_scorer_lpips_is_open_and_a_mesh_has_no_splats() {
         let image = gradient([0.3; 3]);
         let truth = Truth::Composited { rgb: &image, mask: None };
-        let metrics: Vec<MetricId> = MetricId::all().filter(|id| !id.needs_bend()).collect();
+        let known = |id: &MetricId| !id.needs_bend() && !id.needs_before();
+        let metrics: Vec<MetricId> = MetricId::all().filter(known).collect();
         let mesh = Wanted::of(&metrics);
         let score = protocol("").score_with(&image, truth, mesh).unwrap();
         assert!(score.not_computed.keys().eq(&[MetricId::LPIPS]), "{score:?}");

@@ -39,6 +39,8 @@ pub struct Point {
     title: Option<String>,
     label: Option<String>,
     picture: Option<[String; 2]>,
+    /// Why it leads nowhere, where others lead to pictures.
+    without: Option<String>,
 }
 
 const SIZE: [f64; 2] = [640.0, 260.0];
@@ -48,6 +50,8 @@ const LEFT: f64 = 76.0;
 /// Width of a digit where the letters are largest (style.css, on narrow screens), and what the title of the axis takes beside them.
 const DIGIT: f64 = 11.0;
 const TITLE: f64 = 24.0;
+/// Points of a series up to which each is drawn large in a plane.
+const FEW: usize = 60;
 /// From a label to its axis.
 const GAP: f64 = 6.0;
 /// Colours of the style sheet; from there on with another dash.
@@ -56,7 +60,7 @@ const COLOURS: usize = 7;
 impl Point {
     /// A point; one that is not finite is left out.
     pub fn new(x: f64, y: f64) -> Self {
-        Self { x, y, title: None, label: None, picture: None }
+        Self { x, y, title: None, label: None, picture: None, without: None }
     }
 
     /// With what it says when pointed at.
@@ -72,6 +76,11 @@ impl Point {
     /// Leading to the pictures of a frame of a sequence.
     pub fn to(self, sequence: impl Into<String>, frame: impl Into<String>) -> Self {
         Self { picture: Some([sequence.into(), frame.into()]), ..self }
+    }
+
+    /// Without the picture that one could expect: it is drawn hollow and says why.
+    pub fn without_picture(self, why: impl Into<String>) -> Self {
+        Self { without: Some(why.into()), ..self }
     }
 }
 
@@ -116,6 +125,11 @@ impl Chart {
         let fits = |value: f64, log: bool| value.is_finite() && (!log || value > 0.0);
         let points = self.series.iter().flat_map(|s| &s.points);
         points.filter(|p| !(fits(p.x, self.log[0]) && fits(p.y, self.log[1]))).count()
+    }
+
+    /// What it shows.
+    pub(super) fn title(&self) -> &str {
+        &self.title
     }
 
     pub(super) fn markup(&self, at: &str) -> Markup {
@@ -227,11 +241,14 @@ impl Series {
     }
 
     fn mark(&self, point: &Point, [x, y]: [f64; 2], kind: Kind) -> Markup {
-        let radius = if kind == Kind::Scatter { 4.5 } else { 3.0 };
+        let few = self.points.len() <= FEW;
+        let radius = if kind == Kind::Scatter && few { 4.5 } else { 3.0 };
         let title = point.title.clone().unwrap_or_else(|| format!("{}: {}, {}", self.name, point.x, point.y));
+        let title = point.without.iter().fold(title, |title, why| format!("{title}; {why}"));
+        let hollow = point.without.is_some().then_some("hollow");
         let right = x < SIZE[0] * 0.7;
         let dot = html! {
-            circle cx=(n(x)) cy=(n(y)) r=(radius) { title { (title) } }
+            circle class=[hollow] cx=(n(x)) cy=(n(y)) r=(radius) { title { (title) } }
             @if let Some(label) = &point.label {
                 text x=(n(if right { x + 7.0 } else { x - 7.0 })) y=(n(y + 4.0)) text-anchor=(if right { "start" } else { "end" }) { (label) }
             }
@@ -268,6 +285,15 @@ mod tests {
         assert_eq!(html.matches("<circle").count(), 2, "{html}");
         assert!(html.contains("1 of the points cannot be drawn"), "{html}");
         assert!(!html.contains("NaN") && !html.contains("inf\""), "{html}");
+    }
+
+    #[test]
+    fn a_point_without_its_picture_says_so() {
+        let point = Point::new(1.0, 2.0).titled("frame 7").without_picture("its picture was left out");
+        let html =
+            Chart::scatter("T", "x", "y").with(Series::new("a", vec![point])).markup("s").into_string();
+        assert!(html.contains("<title>frame 7; its picture was left out</title>"), "{html}");
+        assert!(html.contains("class=\"hollow\"") && !html.contains("<a "), "{html}");
     }
 
     /// Letters are largest where the page is narrow: 19 units high, 11 a digit.

@@ -35,6 +35,8 @@ pub enum Part {
     Aside(Table),
     /// A chart.
     Chart(Chart),
+    /// Charts of one thing, of which one is shown at a time, each under a name. Those of a section are switched together.
+    Views(Vec<(String, Chart)>),
     /// Pictures under a slider.
     Viewer(Viewer),
     /// A picture by itself, which may move, with its caption.
@@ -154,6 +156,7 @@ impl Part {
                 aside.paper aria-label={ "Printed: " (table.title) } { (table::markup(table)) }
             },
             Self::Chart(chart) => chart.markup(at),
+            Self::Views(views) => switched(views, at),
             Self::Viewer(viewer) => viewer.markup(at),
             Self::Figure(picture, caption) => html! {
                 figure.single { (picture.img(caption)) figcaption { (prose(caption)) } }
@@ -164,6 +167,23 @@ impl Part {
                     @for (i, part) in parts.iter().enumerate() { (part.markup(&format!("{at}-{i}"))) }
                 }
             },
+        }
+    }
+}
+
+/// The first of several charts, and buttons that show another.
+fn switched(views: &[(String, Chart)], at: &str) -> Markup {
+    let label = views.first().map(|(_, chart)| chart.title()).unwrap_or_default();
+    html! {
+        div.views {
+            div.switch role="group" aria-label={ "View of " (label) } {
+                @for (i, (name, _)) in views.iter().enumerate() {
+                    button type="button" aria-pressed=(i == 0) { (name) }
+                }
+            }
+            @for (i, (name, chart)) in views.iter().enumerate() {
+                div data-view=(name) hidden[i > 0] { (chart.markup(&format!("{at}-v{i}"))) }
+            }
         }
     }
 }

@@ -139,5 +139,16 @@ document.addEventListener("click", event => {
   const near = viewers.filter(viewer => viewer.box.closest("section") === link.closest("section"));
   [...near, ...viewers].some(viewer => viewer.open(link.dataset.sequence, link.dataset.frame));
 });
+// Charts with several views: all of a section that have the chosen one show it.
+document.addEventListener("click", event => {
+  const button = event.target.closest(".switch button");
+  if (!button) return;
+  for (const box of button.closest("section").querySelectorAll(".views")) {
+    const views = [...box.querySelectorAll("[data-view]")];
+    if (!views.some(view => view.dataset.view === button.textContent)) continue;
+    views.forEach(view => { view.hidden = view.dataset.view !== button.textContent; });
+    box.querySelectorAll(".switch button").forEach(own => own.setAttribute("aria-pressed", own.textContent === button.textContent));
+  }
+});
 // On paper everything is unfolded.
 addEventListener("beforeprint", () => document.querySelectorAll("details").forEach(fold => { fold.open = true; }));

@@ -77,6 +77,18 @@ fn page() -> Page {
     let chart = Chart::lines("PSNR over frames", "frame", "PSNR, dB")
         .with(Series::new("Original", (0..9).map(point).collect()))
         .with(Series::new("Skinned", (0..9).map(|i| Point::new(f64::from(i), f64::from(i % 4))).collect()));
+    let bent = Chart::scatter("PSNR over bend", "degrees", "PSNR, dB").with(Series::new(
+        "Original",
+        vec![
+            Point::new(95.0, 20.0).to("bike", "image_0000"),
+            Point::new(30.0, 25.0).titled("image_0003").without_picture("its picture was left out"),
+        ],
+    ));
+    let views = |title: &str| {
+        let points = vec![Point::new(0.0, 1.0), Point::new(1.0, 2.0)];
+        let frames = Chart::lines(title, "frame", "dB").with(Series::new("Original", points));
+        Part::Views(vec![("over frames".into(), frames), ("over bend".into(), bent.clone())])
+    };
     let scatter = Chart::scatter("Time against error", "ns", "degrees").log(true, true).with(Series::new(
         "solvers",
         vec![Point::new(80.0, 0.001).labelled("closed-form"), Point::new(400.0, 3.0).labelled("power-15")],
@@ -85,7 +97,13 @@ fn page() -> Page {
         .lead("Made by `reproduce run`.")
         .warning("2 scores are missing")
         .section(Section::new("tables", "Tables").part(Part::Table(table())).part(Part::Aside(table())))
-        .section(Section::new("charts", "Charts").part(Part::Chart(chart)).part(Part::Chart(scatter)))
+        .section(
+            Section::new("charts", "Charts")
+                .part(Part::Chart(chart))
+                .part(Part::Chart(scatter))
+                .part(views("One"))
+                .part(views("Two")),
+        )
         .section(
             Section::new("pictures", "Pictures")
                 .part(Part::Viewer(viewer))
@@ -157,6 +175,24 @@ fn a_person_can_sort_slide_switch_and_print() {
         "bike image_0007: error of Original",
         "a point of a chart leads to its frame"
     );
+
+    let shown = "[...document.querySelectorAll('.views [data-view]')].filter(e => e.checkVisibility()).map(e => e.dataset.view).join()";
+    assert_eq!(browser.value(shown), "over frames,over frames");
+    browser.click(".switch button:last-child", 0.5);
+    assert_eq!(browser.value(shown), "over bend,over bend", "those of a section change together");
+    let pressed =
+        "[...document.querySelectorAll('.switch button')].map(e => e.getAttribute('aria-pressed')).join()";
+    assert_eq!(browser.value(pressed), "false,true,false,true");
+    keep(&mut browser, "page-bend-1400.png");
+    let hollow = "document.querySelector('.views circle.hollow')";
+    assert_eq!(browser.value(&format!("{hollow}.textContent")), "image_0003; its picture was left out");
+    assert_eq!(browser.value(&format!("{hollow}.closest('a') === null")), true);
+    browser.value("document.querySelector('.views a[data-frame=\"image_0000\"]').dispatchEvent(new MouseEvent('click', {bubbles: true, cancelable: true}))");
+    assert_eq!(browser.value(alt), "bike image_0000: error of Original", "so does one of the other view");
+    browser.focus(".switch button:first-child");
+    browser.press("Enter", 13);
+    browser.value("document.activeElement.click()");
+    assert_eq!(browser.value(shown), "over frames,over frames", "by key");
 
     let pdf = browser.pdf();
     assert!(pdf.starts_with(b"%PDF") && pdf.len() > 10_000, "{}", pdf.len());

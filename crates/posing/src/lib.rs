@@ -14,6 +14,7 @@ mod frame;
 mod frustum;
 mod groups;
 mod joints;
+mod jumps;
 mod lanes;
 mod layout;
 mod lift;
@@ -35,6 +36,7 @@ pub use bake::{Baked, bake};
 pub use bound::BoundAvatar;
 pub use error::PosingError;
 pub use face_frame::FaceFrame;
+pub use jumps::rotation_jumps;
 pub use lift::JointLift;
 pub use options::{Gradients, PoseOptions};
 pub use poser::{Poser, pose};
@@ -42,7 +44,7 @@ pub use presets::{PRESETS, Preset};
 pub use push_forward::Across;
 pub use rotate::{LbsProjection, NamedRotation, RotationChoice};
 pub use spec::{Variation, variations};
-pub use spread::face_spreads;
+pub use spread::{BendingJoints, face_spreads};
 pub use strategy::{ClampChoice, ColourChoice, CovarianceChoice, Strategy};
 
 /// Version of this code as part of content keys. Raise it by hand, with a line in CHANGELOG.md, whenever a change moves

@@ -1,7 +1,7 @@
 //! Scores over frames, and fits over their iterations, as charts.
 
-use super::KeptPictures;
-use crate::report::results::{SequenceResults, TableResults, VariantResults};
+use super::pictures::Links;
+use crate::report::results::{FrameResult, SequenceResults, TableResults, VariantResults};
 use skinsplat_metrics::MetricId;
 use skinsplat_page::{Chart, Part, Point, Series};
 use std::collections::BTreeMap;
@@ -11,14 +11,23 @@ const OPEN: usize = 4;
 /// Points of a line; of longer sequences every n-th frame is drawn.
 const POINTS: usize = 1500;
 
-/// A chart per sequence and metric that the table shows.
-pub(super) fn over_frames(results: &TableResults, pictures: &KeptPictures) -> Vec<Part> {
+/// Points of a series over the bend, each of which is drawn by itself.
+const POINTS_APART: usize = 300;
+/// The views of a chart.
+const VIEWS: [&str; 2] = ["over frames", "over bend"];
+
+/// A chart per sequence and metric that the table shows: over frames and, where it is known, over how far the body is bent.
+pub(super) fn over_frames(
+    results: &TableResults,
+    links: &Links<'_>,
+    bends: &BTreeMap<String, f64>,
+) -> Vec<Part> {
     let shown = |metric: &MetricId| results.table.columns.iter().any(|column| column.key == metric.id());
     let metrics: Vec<MetricId> = MetricId::of_frames().filter(shown).collect();
     let mut charts: Vec<Part> = Vec::new();
     for sequence in &results.sequences {
-        let charted = metrics.iter().filter_map(|&metric| chart(results, sequence, metric, pictures));
-        charts.extend(charted.map(Part::Chart));
+        let of = Charted { results, sequence, links, bends };
+        charts.extend(metrics.iter().filter_map(|&metric| of.part(metric)));
     }
     if charts.len() > OPEN {
         let rest = charts.split_off(metrics.len().min(charts.len()));
@@ -27,48 +36,75 @@ pub(super) fn over_frames(results: &TableResults, pictures: &KeptPictures) -> Ve
     charts
 }
 
-fn chart(
-    results: &TableResults,
-    sequence: &SequenceResults,
-    metric: MetricId,
-    pictures: &KeptPictures,
-) -> Option<Chart> {
-    let longest = sequence.variants.iter().map(|variant| variant.frames.len()).max()?;
-    let every = longest.div_ceil(POINTS).max(1);
-    let known = metric.metric();
-    let unit = if known.unit.is_empty() { String::new() } else { format!(", {}", known.unit) };
-    let title = format!("{} over frames: {}", metric.title(), sequence.label);
-    let mut chart = Chart::lines(title, "frame", format!("{}{unit}", metric.title()));
-    if every > 1 {
-        chart = chart.note(format!("Every {every}th frame is drawn."));
-    }
-    let mut any = false;
-    for variant in &sequence.variants {
-        let points = points(results, sequence, variant, metric, pictures, every);
-        any |= !points.is_empty();
-        chart = chart.with(Series::new(&variant.label, points));
-    }
-    any.then_some(chart)
+/// A sequence whose scores are drawn.
+struct Charted<'a> {
+    results: &'a TableResults,
+    sequence: &'a SequenceResults,
+    links: &'a Links<'a>,
+    bends: &'a BTreeMap<String, f64>,
 }
 
-fn points(
-    results: &TableResults,
-    sequence: &SequenceResults,
-    variant: &VariantResults,
-    metric: MetricId,
-    pictures: &KeptPictures,
-    every: usize,
-) -> Vec<Point> {
-    let shown = variant.frames.iter().step_by(every);
-    let point = |frame: &crate::report::FrameResult| {
+impl Charted<'_> {
+    /// The views of a metric; none if no frame has it.
+    fn part(&self, metric: MetricId) -> Option<Part> {
+        let known = metric.metric();
+        let unit = if known.unit.is_empty() { String::new() } else { format!(", {}", known.unit) };
+        let (label, y) = (&self.sequence.label, format!("{}{unit}", metric.title()));
+        let titled = |view: &str| format!("{} {view}: {label}", metric.title());
+        let frames = Chart::lines(titled(VIEWS[0]), "frame", &y);
+        let frames = self.filled(frames, metric, POINTS, |frame| Some(frame.frame as f64))?;
+        let angle = "widest angle between joints that move one place, degrees";
+        let bend = Chart::scatter(titled(VIEWS[1]), angle, &y);
+        let bend = self.filled(bend, metric, POINTS_APART, |frame| self.bends.get(&frame.key).copied());
+        Some(match bend {
+            Some(bend) => Part::Views(VIEWS.map(str::to_owned).into_iter().zip([frames, bend]).collect()),
+            None => Part::Chart(frames),
+        })
+    }
+
+    /// A chart with a series per variant, of at most so many frames; none without a point.
+    fn filled(
+        &self,
+        mut chart: Chart,
+        metric: MetricId,
+        most: usize,
+        x: impl Fn(&FrameResult) -> Option<f64>,
+    ) -> Option<Chart> {
+        let variants = &self.sequence.variants;
+        let longest = variants.iter().map(|variant| variant.frames.len()).max()?;
+        let every = longest.div_ceil(most).max(1);
+        if every > 1 {
+            chart = chart.note(format!("One frame in {every} is drawn."));
+        }
+        let mut any = false;
+        for variant in variants {
+            let frames = variant.frames.iter().step_by(every);
+            let point = |frame: &FrameResult| self.point(variant, frame, metric, x(frame)?);
+            let points: Vec<Point> = frames.filter_map(point).collect();
+            any |= !points.is_empty();
+            chart = chart.with(Series::new(&variant.label, points));
+        }
+        any.then_some(chart)
+    }
+
+    /// The score of a frame, which leads to its pictures where the page has them.
+    fn point(
+        &self,
+        variant: &VariantResults,
+        frame: &FrameResult,
+        metric: MetricId,
+        x: f64,
+    ) -> Option<Point> {
         let value = frame.value(metric)?;
         let digits = metric.decimals() + 1;
-        let title = format!("{}, {}: {value:.digits$}", variant.label, frame.name);
-        let point = Point::new(frame.frame as f64, value).titled(title);
-        let kept = pictures.has(&results.experiment, &sequence.id, &frame.name);
-        Some(if kept { point.to(&sequence.label, &frame.name) } else { point })
-    };
-    shown.filter_map(point).collect()
+        let point =
+            Point::new(x, value).titled(format!("{}, {}: {value:.digits$}", variant.label, frame.name));
+        Some(match self.links.shown(&self.results.experiment, &self.sequence.id, &frame.name) {
+            Some(true) => point.to(&self.sequence.label, &frame.name),
+            Some(false) => point.without_picture("its picture was left out to keep the page small"),
+            None => point,
+        })
+    }
 }
 
 /// A chart of PSNR over iterations per subject of the table.

@@ -12,12 +12,15 @@ use crate::experiment::Source;
 use pictures::Budget;
 use skinsplat_page::{Page, Part, Section};
 use skinsplat_table::Table;
+use std::collections::BTreeMap;
 
 /// What a page may hold beside the results.
 #[derive(Debug, Default)]
 pub struct Extras {
     /// The pictures that the run kept.
     pub pictures: KeptPictures,
+    /// By key of a record, how far the body is bent in its frame, degrees.
+    pub bends: BTreeMap<String, f64>,
     /// How its fits went, as `curves.csv` says.
     pub curves: String,
     /// Further tables, each at the end of the page: where the time went.
@@ -134,7 +137,7 @@ fn section(results: &TableResults, extras: &Extras, budget: &Budget) -> Section 
         section.push(Part::Aside(paper));
     }
     let viewer = budget.viewer(results, &extras.pictures);
-    for part in charts::over_frames(results, &extras.pictures) {
+    for part in charts::over_frames(results, &budget.links(&extras.pictures), &extras.bends) {
         section.push(part);
     }
     if let Some(viewer) = viewer {

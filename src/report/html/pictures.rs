@@ -5,6 +5,7 @@ use crate::report::results::{SequenceResults, TableResults};
 use image::RgbImage;
 use skinsplat_metrics::MetricId;
 use skinsplat_page::{Frame, Part, Picture, Scale, View, Viewer};
+use std::collections::BTreeMap;
 
 /// Errors from here on have the brightest colour.
 const BRIGHTEST: f32 = 0.25;
@@ -18,6 +19,8 @@ pub struct KeptPictures {
     pub moving: Vec<MovingPicture>,
     /// Of how many frames the run kept pictures, if those of some were not read.
     pub kept: usize,
+    /// Frames whose pictures were kept and not read: table, sequence, frame, as in [`Stills`].
+    pub unread: Vec<[String; 3]>,
 }
 
 /// The pictures of a frame.
@@ -57,11 +60,15 @@ impl KeptPictures {
     pub fn is_empty(&self) -> bool {
         self.stills.is_empty() && self.moving.is_empty()
     }
+}
 
-    /// Whether a frame is among them.
-    pub(super) fn has(&self, table: &str, sequence: &str, frame: &str) -> bool {
-        let is = |s: &Stills| s.table == table && s.sequence == sequence && s.frame == frame;
-        self.stills.iter().any(is)
+/// Which frames a page shows pictures of, and of which it left them out.
+pub(super) struct Links<'p>(BTreeMap<[&'p str; 3], bool>);
+
+impl Links<'_> {
+    /// Whether the pictures of a frame are on the page; none if the run kept none of it.
+    pub(super) fn shown(&self, table: &str, sequence: &str, frame: &str) -> Option<bool> {
+        self.0.get(&[table, sequence, frame]).copied()
     }
 }
 
@@ -132,6 +139,17 @@ impl Budget {
     /// Whether the i-th of all frames is shown: where some are left out, every sequence keeps its share.
     fn shows(&self, i: usize) -> bool {
         self.of > 0 && (i + 1) * self.frames / self.of > i * self.frames / self.of
+    }
+
+    /// Where points of charts may lead.
+    pub(super) fn links<'p>(&self, pictures: &'p KeptPictures) -> Links<'p> {
+        let read = pictures
+            .stills
+            .iter()
+            .enumerate()
+            .map(|(i, of)| ([of.table.as_str(), of.sequence.as_str(), of.frame.as_str()], self.shows(i)));
+        let unread = pictures.unread.iter().map(|of| (of.each_ref().map(String::as_str), false));
+        Links(unread.chain(read).collect())
     }
 
     /// The pictures of a table.

@@ -28,6 +28,11 @@ impl MetricId {
     /// Number of Gaussians of the avatar.
     pub const SPLATS: Self = Self::named("splats");
 
+    /// Change from frame to frame that the truth does not have.
+    pub const FLICKER: Self = Self::named("flicker");
+    /// Gaussians whose rotation jumps from frame to frame.
+    pub const ROTATION_JUMPS: Self = Self::named("rotation-jumps");
+
     /// All of them, in the order of [`METRICS`].
     pub fn all() -> impl DoubleEndedIterator<Item = Self> + Clone {
         (0..METRICS.len() as u8).map(Self)
@@ -38,9 +43,9 @@ impl MetricId {
         Self::all().filter(|id| id.is_of_frames())
     }
 
-    /// Those that two images, perhaps with a mask, are enough for.
+    /// Those of a render and its truth that need neither the posed body nor another frame.
     pub fn of_images() -> impl DoubleEndedIterator<Item = Self> + Clone {
-        Self::of_frames().filter(|id| !id.needs_bend())
+        Self::of_frames().filter(|id| !id.needs_bend() && !id.needs_before())
     }
 
     /// The metric of this name.
@@ -76,6 +81,11 @@ impl MetricId {
     /// Whether it asks by how much the body is bent where a pixel shows it: [`Wanted::bend`](crate::Wanted::bend).
     pub fn needs_bend(self) -> bool {
         self.metric().needs == super::bend::NEEDS
+    }
+
+    /// Whether it asks for the frame before: [`Wanted::before`](crate::Wanted::before).
+    pub fn needs_before(self) -> bool {
+        self.metric().needs == super::motion::NEEDS
     }
 
     /// The angles between joints of the pixels that it is taken over, if it is one of the metrics that share out the body by

@@ -63,6 +63,10 @@ pub struct FrameInput<'a> {
     pub errors: &'a ErrorSums,
     /// What computes LPIPS, if anything does.
     pub lpips: Option<&'a dyn PerceptualDistance>,
+    /// The frame before and this one, cut to the pixels that the protocol scores in either, or why there is none.
+    pub succession: Result<&'a [Prepared; 2], &'a str>,
+    /// [`Wanted::rotation_jumps`](crate::Wanted::rotation_jumps).
+    pub rotation_jumps: Result<u64, &'a str>,
 }
 
 /// What a metric says of a frame.

@@ -8,6 +8,7 @@ mod id;
 mod lpips;
 mod mae;
 mod measure;
+mod motion;
 mod psnr;
 mod splats;
 mod ssim;
@@ -15,6 +16,7 @@ mod values;
 
 pub use id::MetricId;
 pub use measure::{AvatarStats, FrameInput, Measure, Measured, Metric, OverFrames};
+pub use motion::ROTATION_JUMP_DEGREES;
 pub use values::Values;
 
 /// Every metric, in the order in which documents and lists name them.
@@ -31,4 +33,6 @@ pub const METRICS: &[Metric] = &[
     bend::FROM_60,
     bend::FROM_90,
     bend::FROM_120,
+    motion::FLICKER,
+    motion::ROTATION_JUMPS,
 ];
