@@ -2,6 +2,7 @@
 // property at a time, which says what each is worth.
 import assert from "node:assert/strict";
 import { compared, rounded } from "./lib/pictures.mjs";
+import { readPly } from "./lib/ply.mjs";
 
 // The original 3DGS, and ours: 0.3 squared pixels on the diagonal, splats out to 3 1/3 deviations at most and 1/255 at least, by depth.
 const reach = 10 / 3;
@@ -77,11 +78,17 @@ export const matched = { spark: all(spark), playcanvas: all(playcanvas), babylon
 const extended = merged([matched.spark, { mesh: { extSplats: true } }]);
 
 const furtherFiles = [
+  { viewer: "spark", file: "posed.ply", how: "as it comes, against ours with --antialiased", job: {}, ours: "ours_antialiased.npy" },
   { viewer: "spark", file: "posed.ply", how: "matched, extSplats", job: extended },
   { viewer: "spark", file: "posed_degree_0.ply", how: "matched, extSplats", job: extended, ours: "ours_degree_0.npy" },
   { viewer: "playcanvas", file: "posed.ply", how: "matched", job: matched.playcanvas },
+  { viewer: "three", file: "posed.ply", how: "matched", job: all(three), ours: "ours_antialiased.npy" },
   { viewer: "babylon", file: "posed.glb", how: "matched, left-handed", job: { ...matched.babylon, leftHanded: true } },
-  { viewer: "babylon", file: "posed.ply", how: "matched, flipY", job: { ...matched.babylon, options: { flipY: true } } },
+  { viewer: "babylon", file: "posed.ply", how: "matched, scaling.y = 1", job: { ...matched.babylon, upright: true } },
+  // Nobody skins: what is drawn is the rest pose.
+  { viewer: "playcanvas", file: "skinned.glb", how: "matched", job: matched.playcanvas, ours: "ours_canonical.npy" },
+  { viewer: "babylon", file: "skinned.glb", how: "matched", job: matched.babylon, ours: "ours_canonical.npy" },
+  { viewer: "three", file: "skinned.glb", how: "matched", job: all(three), ours: "ours_canonical_antialiased.npy" },
   { viewer: "spark", file: "avatar.ply", how: "matched", job: matched.spark, ours: "ours_canonical.npy" },
   ...["0", "1", "2"].flatMap((degree) => [
     { viewer: "spark", file: `posed_degree_${degree}.ply`, how: "matched", job: matched.spark, ours: `ours_degree_${degree}.npy` },
@@ -102,5 +109,29 @@ export async function drawAll(browser, camera, ours, log) {
     log(`${viewer} ${file}, ${how}: ${row.psnr.toFixed(2)} dB, ${((Date.now() - start) / 1000).toFixed(1)} s`);
     rows.push(row);
   }
+  for (const file of ["posed.glb", "skinned.glb"]) {
+    await assert.rejects(browser.draw("spark", { file, camera }), /Unknown file type/, `Spark opens ${file}`);
+  }
   return rows;
+}
+
+/** What Spark's `extSplats` loses of SH of degree 1: the share of coefficients whose largest channel is off by over 1 %, and the most. */
+export async function lossOfExtendedSh(browser, file, path) {
+  const { answer } = await browser.ask("spark", "extendedSh", { file });
+  const bytes = Buffer.from(answer.base64, "base64");
+  const { count, columns } = readPly(path);
+  let [off, most] = [0, 0];
+  for (let i = 0; i < count; i++) {
+    for (let k = 0; k < 3; k++) {
+      const word = bytes.readUInt32LE(4 * (4 * i + k));
+      const unit = 2 ** ((word >>> 27) - 15) / 255;
+      const held = [0, 8, 16].map((shift) => ((word >>> shift) & 255) * unit);
+      const given = [0, 1, 2].map((c) => Math.abs(columns[`f_rest_${3 * c + k}`][i]));
+      const largest = Math.max(...given);
+      const loss = largest > 1e-4 ? 1 - held[given.indexOf(largest)] / largest : 0;
+      if (loss > 0.01) off++;
+      most = Math.max(most, loss);
+    }
+  }
+  return { share: off / (3 * count), most };
 }

@@ -59,6 +59,7 @@ export function makePictures(at, camera) {
   render("posed.ply", "ours.npy");
   render("posed.ply", "ours_antialiased.npy", "--antialiased");
   render("avatar.ply", "ours_canonical.npy");
+  render("avatar.ply", "ours_canonical_antialiased.npy", "--antialiased");
   ["0", "1", "2"].forEach((degree) => render(`posed_degree_${degree}.ply`, `ours_degree_${degree}.npy`));
   render("avatar.ply", "ours_spark.npy", ...pose, "--strategy", "engine-spark");
   render("avatar.ply", "ours_sh_alone.npy", ...pose, "--strategy", "quaternion-average+colour=none");

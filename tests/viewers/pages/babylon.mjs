@@ -15,9 +15,10 @@ import { canvas, nextFrame, readBack } from "./common.mjs";
 
 /**
  * `kernel` is the low-pass in Babylon's unit, a quarter of a squared pixel; `shaders` are changes of shader includes, [include, what is
- * there, what to put there]; `leftHanded` is how Babylon's scenes are by default; `options` are those of the loader of PLY.
+ * there, what to put there]; `leftHanded` is how Babylon's scenes are by default; `upright` takes back the
+ * mirroring of y by which its loader of PLY expects y down.
  */
-export async function draw({ file, camera, kernel = null, shaders = [], leftHanded = false, options = {} }) {
+export async function draw({ file, camera, kernel = null, shaders = [], leftHanded = false, upright = false }) {
   if (kernel !== null) GaussianSplattingMaterial.KernelSize = kernel;
   const engine = new Engine(canvas(camera), false, { preserveDrawingBuffer: true, alpha: false });
   changeShaders(shaders);
@@ -25,10 +26,11 @@ export async function draw({ file, camera, kernel = null, shaders = [], leftHand
   scene.useRightHandedSystem = !leftHanded;
   scene.clearColor = new Color4(...camera.background, 1);
   place(scene, camera, leftHanded);
-  const container = await LoadAssetContainerAsync(`/scenes/${file}`, scene, { pluginOptions: { splat: options } });
+  const container = await LoadAssetContainerAsync(`/scenes/${file}`, scene);
   container.addAllToScene();
   const splats = scene.meshes.find((mesh) => mesh.getClassName() === "GaussianSplattingMesh");
   if (!splats) throw new Error(`no splats among ${scene.meshes.map((mesh) => mesh.getClassName())}`);
+  if (upright) splats.scaling.y = 1;
   await scene.whenReadyAsync();
   for (let frames = 0; frames < 20; frames++) {
     scene.render();

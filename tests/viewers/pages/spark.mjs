@@ -68,3 +68,11 @@ function skinning(mesh, { rest, posed, joints, weights }) {
   skinning.updateBones();
   return skinning;
 }
+
+/** The first band of SH in Spark's extended form, three words a splat: as it holds them, base64. */
+export async function extendedSh({ file }) {
+  const mesh = new SplatMesh({ fileBytes: await bytesOf(file), fileName: file, extSplats: true });
+  await mesh.initialized;
+  const words = mesh.extSplats.extra.sh1;
+  return answer(words.slice(0, 4 * mesh.numSplats), { width: 4, height: mesh.numSplats });
+}
