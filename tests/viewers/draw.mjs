@@ -98,7 +98,7 @@ const furtherFiles = [
   { viewer: "playcanvas", file: "posed_padded.ply", how: "matched", job: matched.playcanvas, ours: "ours_degree_2.npy" },
 ];
 
-/** All rows: { viewer, file, how, psnr, largest, far, picture, complaints, seconds }. `ours` opens one of our own pictures. */
+/** All rows: { viewer, file, how, psnr, largest, far, picture, complaints }. `ours` opens one of our own pictures. */
 export async function drawAll(browser, camera, ours, log) {
   const jobs = everyProperty.flatMap(({ changes, ...rest }) => variants(changes).map((variant) => ({ ...rest, ...variant })));
   const rows = [];

@@ -147,7 +147,8 @@ function tables(rows, { rows: skinning, further }, { share, most }) {
     "",
     ...table(["what"], skinning.map((r) => [r.what, ...numbers(r)])),
     "",
-    `Spark's \`extSplats\`, SH of degree 1: ${(100 * share).toFixed(0)} % of coefficients have their largest channel cut by more than 1 %, at most by ${(100 * most).toFixed(0)} %.`,
+    `Spark's \`extSplats\`, SH of degree 1: ${(100 * share).toFixed(0)} % of coefficients have their largest channel cut by more than`,
+    `1 %, at most by ${(100 * most).toFixed(0)} %.`,
     "",
   ].join("\n");
 }
