@@ -53,6 +53,10 @@ export async function skinInSpark(browser, camera, ours, at, key, log) {
   const bones = await skin(at("skinned.glb"), key, false);
   const skinned = await draw("avatar.ply", { skin: bones });
   const byPlaces = await draw("avatar.ply", { skin: await skin(at("skinned.glb"), key, true) });
+  // Linear mode takes extended splats only, whose SH are clipped: it is held against a file drawn alike.
+  const extended = { mesh: { extSplats: true } };
+  const linear = await draw("avatar.ply", { skin: { ...bones, linear: true }, ...extended });
+  const posedExtended = await draw("posed.ply", extended);
   const posed = await draw("posed.ply");
   const turned = await draw("posed_spark_sh_turned.ply");
   const alone = await draw("posed_spark.ply");
@@ -64,6 +68,7 @@ export async function skinInSpark(browser, camera, ours, at, key, log) {
     ["Spark's skinning, against our preset engine-spark drawn by Spark", skinned, alone],
     ["Spark's skinning, against our renderer under the preset", skinned, ours("ours_spark.npy")],
     ["our average without SH turned against it with, our renderer", ours("ours_sh_alone.npy"), ours("ours.npy")],
+    ["Spark's skinning in linear mode, against our average drawn by Spark", linear, posedExtended],
     ["joints by rest and posed places, against our average drawn by Spark", byPlaces, posed],
   ];
   const rows = sides.map(([what, one, two]) => ({ what, ...compared(rounded(one), rounded(two)) }));

@@ -1,5 +1,5 @@
 // Spark: posed PLY files, and its own skinning.
-import { SparkRenderer, SplatMesh, SplatSkinning } from "@sparkjsdev/spark";
+import { SparkRenderer, SplatMesh, SplatSkinning, SplatSkinningMode } from "@sparkjsdev/spark";
 import * as THREE from "three";
 import { answer, bytesOf, canvas, readBack, until } from "./common.mjs";
 
@@ -14,10 +14,11 @@ export async function draw({ file, camera, spark: options = {}, mesh: meshOption
   renderer.setSize(camera.width, camera.height, false);
   renderer.setClearColor(new THREE.Color(...camera.background), 1);
   const scene = new THREE.Scene();
-  const spark = new SparkRenderer({ renderer, autoUpdate: false, ...options });
+  const covSplats = skin?.linear ?? false; // what linear blend skinning asks for
+  const spark = new SparkRenderer({ renderer, autoUpdate: false, covSplats, ...options });
   capAlpha(spark.material, cap);
   scene.add(spark);
-  const mesh = new SplatMesh({ fileBytes: await bytesOf(file), fileName: file, ...meshOptions });
+  const mesh = new SplatMesh({ fileBytes: await bytesOf(file), fileName: file, covSplats, ...meshOptions });
   await mesh.initialized;
   scene.add(mesh);
   if (skin) mesh.skinning = skinning(mesh, skin);
@@ -54,10 +55,11 @@ export function threeCamera({ width, height, near, far, fov, view, projection })
 
 /**
  * Bones as Spark takes them. `rest` and `posed` are seven numbers a joint, quaternion (x, y, z, w) and place; `joints` and `weights`
- * are four a splat.
+ * are four a splat; `linear` blends matrices, not dual quaternions.
  */
-function skinning(mesh, { rest, posed, joints, weights }) {
-  const skinning = new SplatSkinning({ mesh, numBones: rest.length });
+function skinning(mesh, { rest, posed, joints, weights, linear = false }) {
+  const mode = linear ? SplatSkinningMode.LINEAR_BLEND : SplatSkinningMode.DUAL_QUATERNION;
+  const skinning = new SplatSkinning({ mesh, numBones: rest.length, mode });
   const parts = (bone) => [new THREE.Quaternion(...bone.slice(0, 4)), new THREE.Vector3(...bone.slice(4))];
   rest.forEach((bone, j) => skinning.setRestQuatPos(j, ...parts(bone)));
   posed.forEach((bone, j) => skinning.setBoneQuatPos(j, ...parts(bone)));
