@@ -104,10 +104,11 @@ impl Work {
         let cli =
             cli.map_err(|error| anyhow::anyhow!("arguments of run: {}", one_line(&error.to_string())))?;
         let Command::Run(run) = &cli.command else { bail!("arguments of run: expected those of `run`") };
-        match run.unsliced() {
-            Some(option) => bail!("arguments of run: {option}; expected it before --, or not at all"),
-            None => Ok(()),
+        if let Some(option) = run.unsliced() {
+            bail!("arguments of run: {option}; expected it before --, or not at all");
         }
+        run.planning().experiments().context("arguments of run")?;
+        Ok(())
     }
 
     /// `run` on the slice that `index` stands for in the shell.

@@ -72,7 +72,7 @@ Exit codes:
 
 Examples:
   reproduce compare runs/main runs/mine
-  reproduce compare ci/baseline.json runs/ci --tolerances ci/tolerances.toml --save junit=compare.xml
+  reproduce compare ci/baseline.json runs/ci --save junit=compare.xml
   reproduce compare runs/mine --against-paper";
 
 /// A file and its format.

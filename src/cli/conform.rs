@@ -18,7 +18,7 @@ pub(super) struct Conform {
 
 const EXAMPLES: &str = "\
 Examples:
-  reproduce conform export --out rig                    PLY, body, poses, camera, vectors and a README
+  reproduce conform export --out rig                    PLY, body, poses, camera, vectors
   reproduce conform export --out rig --convention unity vectors as Unity has them
   reproduce conform check rig posed/                    a folder with a posed PLY per pose
   reproduce conform check rig answer.json --format json";

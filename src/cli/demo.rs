@@ -28,7 +28,7 @@ Examples:
 
 /// The data set of Blender renders, and a figure for where it is not.
 const RENDERED: &str = "snapshot_ava";
-const GENERATED: &str = "ring_stripes";
+const GENERATED: &str = "stripes";
 
 /// The run that a demo is.
 #[derive(Debug, Parser)]
@@ -40,7 +40,10 @@ struct Command {
 impl Demo {
     /// How to go on after the demo was stopped.
     pub(super) fn advice(&self) -> String {
-        format!("what is done is kept in {}; the same command goes on from there", self.out.display())
+        format!(
+            "what is done is kept in {}; the same command goes on from there",
+            quoted(self.out.as_os_str())
+        )
     }
 
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
@@ -57,6 +60,9 @@ impl Demo {
         context.note(format!("reproduce run {}", shown.join(" ")));
         let command = Command::try_parse_from(std::iter::once("reproduce run".into()).chain(arguments))?;
         let exit = command.run.run(context)?;
+        if exit != Exit::Success {
+            return Ok(exit);
+        }
         let (out, page) = (self.out.display(), page.display());
         context.note(format!(
             "pictures: {page} in a browser, or {out}/images. Next: `reproduce run` for the tables of the paper, `reproduce \

@@ -55,7 +55,7 @@ enum Kind {
 
 const EXAMPLES: &str = "\
 Examples:
-  reproduce export A.ply --body B.npz --poses P.npz --frame 12 --to posed-ply --degree 3 --out posed.ply
+  reproduce export A.ply --body B.npz --poses P.npz --frame 9 --to posed-ply --degree 3 --out p.ply
   reproduce export A.ply --body B.npz --poses P.npz --all-frames --to glb --out frames/
   reproduce export A.ply --body B.glb --poses B.glb --to skinned-glb --out skinned.glb";
 

@@ -54,8 +54,8 @@ pub(super) struct Fit {
 
 const EXAMPLES: &str = "\
 Examples:
-  reproduce fit snapshot_ava/ava --out ava.ply
-  reproduce fit snapshot_ava/ava --recipe hugs-original --seed 1 --out hugs.ply
+  reproduce fit snapshot_ava --out ava.ply
+  reproduce fit snapshot_ava --recipe hugs-original --seed 1 --out hugs.ply
   reproduce fit ava --data DIR --profile paper --test-every 1000 --out ava.ply
   reproduce render ava.ply --body BODY --poses POSES --frame 0 --camera CAMERA.json --out ava.png";
 

@@ -36,7 +36,7 @@ const EXAMPLES: &str = "\
 Examples:
   reproduce inspect avatar.ply              Gaussians, binding, dialect
   reproduce inspect data/neuman/seattle     what a data set holds and lacks
-  reproduce inspect runs/default            a run";
+  reproduce inspect runs/default/results.json";
 
 impl Inspect {
     pub(super) fn run(&self, context: super::Context) -> Result<Exit> {

@@ -44,8 +44,8 @@ pub(super) struct Planning {
     #[arg(long, value_name = "START..END", value_parser = range, help_heading = "Subset")]
     frames: Option<Range>,
     /// At most N test frames per sequence
-    #[arg(long, value_name = "N", help_heading = "Subset")]
-    limit: Option<usize>,
+    #[arg(long, value_name = "N", help_heading = "Subset", value_parser = clap::value_parser!(u32).range(1..))]
+    limit: Option<u32>,
     /// Only this subject (may be repeated)
     #[arg(long = "subject", value_name = "ID", help_heading = "Subset")]
     subjects: Vec<String>,
@@ -86,7 +86,7 @@ impl Planning {
         }
         let subset = Subset {
             frames: self.frames.map(|Range(range)| range),
-            limit: self.limit,
+            limit: self.limit.map(|limit| limit as usize),
             subjects: self.subjects.clone(),
             variants: self.variants.clone(),
         };
@@ -121,6 +121,11 @@ impl Planning {
                 (variant.sh_degree, variant.strategy) = (None, None);
             }
         }
+        if !self.avatars.is_empty() || !self.renders.is_empty() {
+            let note = "Files and folders that were given stand in the place of fits: what is said here of fits, budgets and starts \
+                        does not hold for them.";
+            experiments.iter_mut().for_each(|experiment| experiment.notes.push(note.to_owned()));
+        }
         Ok(experiments)
     }
 
@@ -129,7 +134,8 @@ impl Planning {
         Profile { fit_iterations, ..self.profile.clone() }
     }
 
-    fn experiments(&self) -> Result<Vec<Experiment>> {
+    /// The experiments that the arguments name.
+    pub(super) fn experiments(&self) -> Result<Vec<Experiment>> {
         let known = known_experiments()?;
         let built_in = Experiment::embedded_all();
         let mut chosen = Vec::new();
@@ -201,7 +207,7 @@ pub(super) fn known_experiments() -> Result<Vec<Experiment>> {
 }
 
 pub(super) fn profile(id: &str) -> Result<Profile, String> {
-    Profile::preset(id).ok_or_else(|| format!("expected one of {}", Profile::IDS.join(", ")))
+    Profile::preset(id).ok_or_else(|| format!("expected {}", one_of(id, &Profile::IDS)))
 }
 
 fn given_avatar() -> impl TypedValueParser<Value = GivenAvatar> {

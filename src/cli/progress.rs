@@ -7,6 +7,7 @@ use skinsplat_fit::train::Step;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// What a single fit is called.
 const FITTING: &str = "fitting";
@@ -37,6 +38,9 @@ impl Watch {
         if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
             bar.set_style(style.with_key("left", left));
         }
+        if !bar.is_hidden() {
+            bar.enable_steady_tick(Duration::from_secs(1));
+        }
         let lines = !quiet && !std::io::stderr().is_terminal();
         Self { bar, quiet, lines, avatars: AtomicU64::new(0), avatar: Mutex::default(), part: String::new() }
     }
@@ -53,7 +57,8 @@ impl Watch {
         match event {
             Event::Avatars(count) => self.start("avatars", count),
             Event::Frames(count) => self.start("frames", count),
-            Event::Avatar(name) => {
+            Event::Avatar(name, variants) => {
+                let name = format!("{name}, for {}", variants.join(", "));
                 let number = self.avatars.fetch_add(1, Ordering::Relaxed) + 1;
                 let all = self.bar.length().unwrap_or_default();
                 self.line(&format!("{}avatar {number}/{all}: {name}", self.part));
@@ -68,13 +73,15 @@ impl Watch {
                 ));
             }
             Event::Took(..) => {}
-            Event::AvatarReady | Event::FrameDone => {
-                self.detail(String::new());
-                self.bar.inc(1);
-            }
+            Event::AvatarReady => self.done(""),
+            Event::FrameDone(name) => self.done(&name),
             Event::SequenceDone(name, frames) => {
                 let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
-                self.line(&format!("{}sequence {name}: {frames} frames; {done} of {all} in all", self.part));
+                self.line(&format!(
+                    "{}sequence {name}: {frames} {}; {done} of {all} in all",
+                    self.part,
+                    if frames == 1 { "frame" } else { "frames" }
+                ));
             }
             Event::Warning(text) => self.above(&format!("warning: {text}"), self.quiet),
         }
@@ -82,6 +89,12 @@ impl Watch {
 
     fn avatar(&self) -> MutexGuard<'_, String> {
         self.avatar.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// One step further; what it was.
+    fn done(&self, name: &str) {
+        self.detail(if name.is_empty() { String::new() } else { format!(" | {name}") });
+        self.bar.inc(1);
     }
 
     /// A line, where there is no bar.
@@ -120,16 +133,18 @@ impl Watch {
 
     /// A bar of so many steps begins.
     pub(super) fn start(&self, what: &str, count: usize) {
-        self.bar.set_message(format!("{}{what}", self.part));
-        self.bar.set_length(count as u64);
+        // The position first: a bar that seems to be at its end says so.
         self.bar.set_position(0);
+        self.bar.set_length(count as u64);
+        self.bar.set_message(format!("{}{what}", self.part));
         self.bar.reset_eta();
     }
 }
 
 /// How much longer it will take, once there is something to tell it from.
 fn left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
-    if state.pos() > 0 {
+    let (done, all) = (state.pos(), state.len().unwrap_or_default());
+    if done > 0 && done < all && state.eta().as_secs() > 0 {
         // Nobody can be told of an error here.
         let _ = write!(out, ", about {:#} left", HumanDuration(state.eta()));
     }

@@ -40,7 +40,7 @@ pub(super) struct Render {
 const EXAMPLES: &str = "\
 Examples:
   reproduce render avatar.ply --camera camera.json --out picture.png
-  reproduce render avatar.ply --camera cameras.npz --camera-index 3 --body body.npz --poses poses.npz --frame 12 --out posed.png";
+  reproduce render a.ply --camera c.npz --body body.npz --poses poses.npz --frame 12 --out p.png";
 
 impl Render {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {

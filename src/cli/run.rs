@@ -4,6 +4,7 @@ use super::output::emit;
 use super::page::{Images, PICTURES, page, write_page};
 use super::planning::{Planned, Planning};
 use super::products::{AVATARS, make_folder, verdict, write_bend, write_curves, write_results, write_text};
+use super::quoting::quoted;
 use super::{Context, Exit, progress::Watch};
 use anyhow::{Context as _, Result};
 use skinsplat::experiment::{Job, Records, Shard, Unreadable};
@@ -99,9 +100,17 @@ impl Run {
         ]
     }
 
+    /// What is planned.
+    pub(super) fn planning(&self) -> &Planning {
+        &self.planning
+    }
+
     /// How to go on after the run was stopped.
     pub(super) fn advice(&self) -> String {
-        format!("what is done is kept in {}; the same command goes on from there", self.out.display())
+        format!(
+            "what is done is kept in {}; the same command goes on from there",
+            quoted(self.out.as_os_str())
+        )
     }
 
     pub(super) fn run(&self, context: Context) -> Result<Exit> {

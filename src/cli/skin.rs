@@ -39,7 +39,7 @@ enum Continuity {
 const EXAMPLES: &str = "\
 Examples:
   reproduce skin avatar.ply --body body.npz --poses poses.npz --frame 12 --out posed.ply
-  reproduce skin avatar.ply --body rig.glb --poses rig.glb --clip Walk --strategy lbs --out posed.ply";
+  reproduce skin a.ply --body rig.glb --poses rig.glb --clip Walk --strategy lbs --out posed.ply";
 
 impl Skin {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {

@@ -61,7 +61,7 @@ impl Stress {
             let examined = section.examine(self.quick)?;
             findings.push(examined.findings);
             pictures.extend(examined.pictures);
-            watch.see(skinsplat::run::Event::FrameDone);
+            watch.see(skinsplat::run::Event::FrameDone(section.id().to_owned()));
         }
         drop(watch);
         let report = Report::new(self.quick, findings, pictures);

@@ -120,6 +120,13 @@ impl Job {
         format!("{dataset}/{subject}/{sequence}/{name} {}", variant.id)
     }
 
+    /// The frame with its sequence and subject, and the variants that are drawn of it.
+    pub fn frame_name(&self) -> String {
+        let variants: Vec<&str> = self.variants.iter().map(|variant| variant.id.as_str()).collect();
+        let Self { subject, sequence, name, .. } = self;
+        format!("{subject}/{sequence}/{name} of {}", variants.join(", "))
+    }
+
     /// The sequence with its subject and data set.
     pub fn sequence_name(&self) -> String {
         format!("{}/{}/{}", self.dataset, self.subject, self.sequence)
@@ -181,6 +188,9 @@ pub fn plan(experiments: &[Experiment], datasets: &[Dataset], options: &Options)
     let tables: Vec<PlannedTable> =
         numbered.map(|(index, experiment)| builder.table(index, experiment)).collect::<Result<_, _>>()?;
     let Builder { avatars, jobs, .. } = builder;
+    if jobs.is_empty() {
+        subjects_are_of_a_table(experiments, datasets, options)?;
+    }
     let digest = Plan::digest_of(options, &tables, &jobs);
     Ok(Plan { options: options.clone(), tables, avatars, jobs, digest })
 }
@@ -441,6 +451,28 @@ fn time_steps(sequence: &SequenceInfo) -> Vec<usize> {
 /// The sequence of this id, which rows take from their subject.
 pub(super) fn find_sequence<'a>(subject: &'a SubjectInfo, id: &str) -> &'a SequenceInfo {
     subject.sequences.iter().find(|sequence| sequence.id == id).expect("rows name sequences of their subject")
+}
+
+/// Refuses subjects of whom none belongs to any of the tables, where others do.
+fn subjects_are_of_a_table(
+    experiments: &[Experiment],
+    datasets: &[Dataset],
+    options: &Options,
+) -> Result<(), Error> {
+    let asked = &options.subset.subjects;
+    let everybody = Options {
+        subset: super::Subset { subjects: Vec::new(), ..options.subset.clone() },
+        ..options.clone()
+    };
+    let rows = experiments.iter().flat_map(|experiment| rows_of(experiment, datasets, &everybody).1);
+    let known: BTreeSet<String> = rows.filter(|row| row.missing.is_none()).map(|row| row.subject).collect();
+    if asked.is_empty() || known.is_empty() || asked.iter().any(|id| known.contains(id)) {
+        return Ok(());
+    }
+    let ids: Vec<&str> = experiments.iter().map(|experiment| experiment.id.as_str()).collect();
+    let problem = format!("`{}`: not among the data of {}", asked.join("`, `"), ids.join(", "));
+    let known: Vec<String> = known.into_iter().collect();
+    Err(Error::invalid("subset", "subjects", problem, one_of(&asked[0], &known)))
 }
 
 /// Refuses a subset that would leave nothing because of a name that does not exist.

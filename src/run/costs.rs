@@ -79,7 +79,7 @@ pub fn measure(
         for (k, job) in jobs.iter().enumerate() {
             // A frame that cannot be read has said so where it was to be scored.
             let _ = time_frame(k, job, library, &avatars, &mut times);
-            watch(Event::FrameDone);
+            watch(Event::FrameDone(String::new()));
         }
         for (v, variant) in table.variants.iter().enumerate() {
             let frames: Vec<[f64; 2]> =

@@ -16,8 +16,8 @@ use skinsplat_fit::train::Step;
 use skinsplat_metrics::lpips::{NetworkSource, OneFrame};
 use skinsplat_metrics::{PerceptualDistance, Wanted};
 use skinsplat_posing::BendingJoints;
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -27,8 +27,8 @@ use std::time::Instant;
 pub enum Event {
     /// So many avatars have to be made or read before the frames.
     Avatars(usize),
-    /// This one comes next.
-    Avatar(String),
+    /// This one comes next, for these variants.
+    Avatar(String, Vec<String>),
     /// A part of its fit took so many seconds.
     Took(Part, f64),
     /// An iteration of its fit is done.
@@ -39,8 +39,8 @@ pub enum Event {
     AvatarReady,
     /// So many jobs are to be done.
     Frames(usize),
-    /// One of them is done.
-    FrameDone,
+    /// One of them, called so, is done.
+    FrameDone(String),
     /// The last frame of a sequence is done, of so many.
     SequenceDone(String, usize),
 }
@@ -73,7 +73,7 @@ pub fn execute(
         let (store, left) = &mut *state;
         store.append(&records)?;
         for job in group {
-            watch(Event::FrameDone);
+            watch(Event::FrameDone(job.frame_name()));
             left.done(job, watch);
         }
         Ok::<(), Error>(())
@@ -135,7 +135,10 @@ pub(super) fn prepare_avatars(
     let mut workshop = Workshop::new(plan, library, folder, watch);
     let mut avatars = Avatars::new();
     for avatar in planned {
-        watch(Event::Avatar(avatar.label()));
+        let variants =
+            jobs.iter().flat_map(|job| &job.variants).filter(|variant| variant.avatar == avatar.key);
+        let variants: BTreeSet<&str> = variants.map(|variant| variant.id.as_str()).collect();
+        watch(Event::Avatar(avatar.label(), variants.into_iter().map(str::to_owned).collect()));
         let built = workshop.prepare(avatar).map_err(|error| error.to_string());
         avatars.insert(avatar.key.clone(), built);
         watch(Event::AvatarReady);

@@ -66,7 +66,7 @@ pub fn write(
         let variants: Vec<&str> = job.variants.iter().map(|variant| variant.id.as_str()).collect();
         let caption = format!("{} {} {}", table.experiment, table.rows[job.row].label, job.name);
         let _ = write!(page, "\n{caption}: truth, {}\n\n![{caption}]({name})\n", variants.join(", "));
-        watch(Event::FrameDone);
+        watch(Event::FrameDone(String::new()));
     }
     Ok(page)
 }

@@ -228,7 +228,9 @@ fn missing(file: &PlanFile, records: &Records, sources: &[Source]) -> Vec<Missin
         };
         if seen.insert(&variant.key) {
             let shard = slices.as_ref().and_then(|slices| slices.owner(&variant.key));
-            missing.push(Missing { label: job.label(variant), shard, problem });
+            let table = &file.plan.tables[job.table].experiment;
+            let label = format!("{table}: {}", job.label(variant));
+            missing.push(Missing { label, shard, problem });
         }
     }
     missing

@@ -223,7 +223,7 @@ fn draw(
         let view = PosedView { pose, camera: scene.view.camera, body, name: "", stored: scene.view.stored };
         let drawn = avatar.draw(&view, &look, scratch)?;
         save_png(&folder.join(format!("frame_{index:04}.png")), &drawn.image)?;
-        watch(Event::FrameDone);
+        watch(Event::FrameDone(String::new()));
         Ok(())
     })
 }

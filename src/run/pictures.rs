@@ -215,7 +215,7 @@ impl Sequence<'_> {
                 }
                 moving.push(drawn);
             }
-            watch(Event::FrameDone);
+            watch(Event::FrameDone(String::new()));
         }
         if moving.len() < 2 {
             return Ok(());

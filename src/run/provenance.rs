@@ -107,7 +107,7 @@ impl Stopwatch {
     pub fn see(&self, event: &Event) {
         let mut laps = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         match event {
-            Event::Avatar(label) => {
+            Event::Avatar(label, _) => {
                 laps.since = Instant::now();
                 laps.avatar = Some(label.clone());
                 (laps.parts, laps.fitted) = (FitParts::default(), false);
@@ -130,7 +130,7 @@ impl Stopwatch {
                 laps.since = Instant::now();
                 laps.frames = laps.phases.frames;
             }
-            Event::FrameDone => laps.phases.frames = laps.frames + laps.since.elapsed().as_secs_f64(),
+            Event::FrameDone(_) => laps.phases.frames = laps.frames + laps.since.elapsed().as_secs_f64(),
             _ => {}
         }
     }

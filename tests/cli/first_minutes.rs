@@ -35,3 +35,28 @@ fn every_table_is_printed_when_it_is_done() {
     let at = |line: &str| run.err.find(line).unwrap_or_else(|| panic!("{line}: {}", run.err));
     assert!(at("b: avatar 1/1") < at("b: sequence") && at("b: sequence") < at("a: avatar 1/1"));
 }
+
+/// Away from the repository the figure is one that is generated.
+#[test]
+fn a_demo_needs_no_data() {
+    let desk = Desk::new();
+    let mut command = desk.command(args!["demo"]);
+    command.env_remove("REPRODUCE_DATASETS");
+    let answer = crate::program::Answer::of(&mut command).exits(0, "a demo without data");
+    assert!(
+        answer.out.contains("Ran on: Synthetic figure") && answer.out.contains("Average of quaternions"),
+        "{}",
+        answer.out
+    );
+    assert!(desk.path("runs/demo/demo.html").is_file());
+}
+
+#[test]
+fn a_subject_of_another_kind_of_capture_is_refused() {
+    let desk = Desk::new();
+    for command in ["plan", "run"] {
+        desk.run(args![command, "table4", "--subject", "stripes"])
+            .refuses(&["`stripes`: not among the data of table4", "ring_stripes"], command);
+    }
+    desk.run(args!["run", "table1", "--limit", "0"]).refuses(&["--limit", "0"], "no frame");
+}

@@ -151,7 +151,10 @@ fn a_body_out_of_view_does_not_stop_later_runs() {
 fn a_log_has_a_line_per_avatar_and_sequence() {
     let desk = desk();
     let answer = run(&desk, &["--out", "run"]).exits(0, "a run");
-    for line in ["avatar 1/2: tiny/tiny surface-vertex\n", "avatar 2/2: tiny/tiny fit hugs-skinned 0\n"] {
+    for line in [
+        "small: avatar 1/2: tiny/tiny surface-vertex, for surface\n",
+        "small: avatar 2/2: tiny/tiny fit hugs-skinned 0, for theirs\n",
+    ] {
         assert!(answer.err.contains(line), "no `{line}` in {}", answer.err);
     }
     assert!(answer.err.contains("sequence tiny/tiny/test_b: 3 frames; 3 of 3 in all\n"), "{}", answer.err);

@@ -156,7 +156,7 @@ fn sizes_must_agree_and_files_are_named() {
         .refuses(&["renders/2.png", "truths/2.png", "41x36", "40x36"], "sizes");
     std::fs::remove_file(desk.path("masks/2.png")).unwrap();
     desk.run(args!["score", "renders", "truths", "--mask", "masks"])
-        .refuses(&["truths: frames 2", "masks"], "masks");
+        .refuses(&["masks: no mask for frame 2", "truths"], "masks");
     save("renders/2.png", 40, 36);
     std::fs::rename(desk.path("masks"), desk.path("old")).unwrap();
     for frame in ["1", "2"] {
@@ -166,9 +166,13 @@ fn sizes_must_agree_and_files_are_named() {
     let answer = desk.run(args!["score", "renders", "truths", "--mask", "masks"]).exits(0, "masks by number");
     assert!(answer.err.contains("masks paired by their numbers: m_1 for 1"), "{}", answer.err);
     let bytes = desk.bytes("old/1.png");
-    desk.put("masks/other_2.png", bytes);
+    desk.put("masks/m_003.png", &bytes);
+    desk.ok(args!["score", "renders", "truths", "--mask", "masks"]);
+    desk.put("masks/other_02.png", bytes);
     desk.run(args!["score", "renders", "truths", "--mask", "masks"])
-        .refuses(&["m_1", "no partner"], "two of a number");
+        .refuses(&["masks: no mask for frame 2", "one mask with its last number"], "two of a number");
+    desk.run(args!["score", "renders/1.png", "truths"])
+        .refuses(&["renders/1.png: a file", "folder"], "a file");
 }
 
 #[test]

@@ -119,6 +119,9 @@ fn every_command_shows_examples() {
         let command = format!("\n  reproduce {}", words[0]);
         let examples = help.split_once("Examples:").map(|(_, text)| text).unwrap_or_default();
         assert!(examples.contains(&command), "{words:?}: {help}");
+        // Wrapped, an example could not be pasted.
+        let whole = |line: &str| line.trim().is_empty() || line.starts_with("  reproduce ");
+        assert!(examples.lines().all(whole), "{words:?}: {examples}");
     }
 }
 
@@ -138,6 +141,10 @@ fn a_slip_of_the_pen_is_told_what_was_meant() {
         (args!["fetch-help", "neumann"], "`neuman`"),
         (args!["score", "a", "b", "--protocol", "hugs-humans"], "`hugs-human`"),
         (args!["skin", "a", "--strategy", "quaternion-averag", "--out", "b"], "`quaternion-average`"),
+        (args!["score", "a", "b", "--protocol", "hugs-human+regoin=full"], "`region`"),
+        (args!["run", "--profile", "quik"], "`quick`"),
+        (fit("dots", "haha+rates.positon=1"), "`rates.position`"),
+        (args!["batch", "slurm", "--shards", "2", "--", "tabel1"], "`table1`"),
     ] {
         let what = format!("{arguments:?}");
         desk.run(arguments).refuses(&[meant], &what);

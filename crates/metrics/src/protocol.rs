@@ -5,6 +5,7 @@ use super::{LpipsVariant, MetricsError, PsnrVariant, Region, SsimVariant};
 use crate::Aggregation;
 use serde::{Deserialize, Serialize};
 use skinsplat_core::choice::one_of;
+use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 /// What a straight truth is composited over; the render must have been drawn over the same.
@@ -140,25 +141,50 @@ impl Protocol {
             problem,
             expected: expected.to_owned(),
         };
+        // A name as it is printed ends with the version.
+        let (specification, version) = match specification.rsplit_once('@') {
+            Some((name, version)) => (name, Some(version)),
+            None => (specification, None),
+        };
         let mut parts = specification.split('+').map(str::trim);
         let preset = parts.next().unwrap_or_default();
         let base = Self::preset(preset).ok_or_else(|| {
             let ids: Vec<&str> = PROTOCOLS.iter().map(|protocol| protocol.id.as_str()).collect();
             error(format!("no preset \"{preset}\""), &one_of(preset, &ids))
         })?;
+        if let Some(version) = version.filter(|version| **version != base.version.to_string()) {
+            return Err(error(
+                format!("version {version}"),
+                &format!("version {}, which this program has", base.version),
+            ));
+        }
         let mut table = toml::Table::try_from(base).map_err(|e| error(e.to_string(), "a protocol"))?;
-        let mut varied = false;
+        let mut varied = BTreeSet::new();
         for part in parts {
-            const CHOICES: &str = "FIELD=VALUE with a field of step 1 to 5: background, clamp, quantise, region, \
-                                   mask_threshold, psnr, ssim, lpips, aggregate";
-            let (field, value) = part.split_once('=').ok_or_else(|| error(format!("\"{part}\""), CHOICES))?;
-            if !table.contains_key(field) || ["id", "version", "title", "source"].contains(&field) {
-                return Err(error(format!("no field \"{field}\""), CHOICES));
+            const FIELDS: [&str; 9] = [
+                "background",
+                "clamp",
+                "quantise",
+                "region",
+                "mask_threshold",
+                "psnr",
+                "ssim",
+                "lpips",
+                "aggregate",
+            ];
+            let choices =
+                |field: &str| format!("FIELD=VALUE with a field that is {}", one_of(field, &FIELDS));
+            let (field, value) =
+                part.split_once('=').ok_or_else(|| error(format!("\"{part}\""), &choices(part)))?;
+            if !FIELDS.contains(&field) {
+                return Err(error(format!("no field \"{field}\""), &choices(field)));
+            }
+            if !varied.insert(field) {
+                return Err(error(format!("\"{field}\" twice"), "each field once"));
             }
             table.insert(field.to_owned(), value_of(value));
-            varied = true;
         }
-        if varied {
+        if !varied.is_empty() {
             table.insert("id".to_owned(), specification.into());
         }
         let protocol: Self = table.try_into().map_err(|e: toml::de::Error| {

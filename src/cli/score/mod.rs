@@ -84,7 +84,7 @@ struct Scored {
     /// Why the protocol has no score for this frame, though it has for others.
     #[serde(skip_serializing_if = "Option::is_none")]
     protocol_not_computed: Option<String>,
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     over_another_background: bool,
 }
 
@@ -104,7 +104,9 @@ impl Score {
         let networks = self.weights.networks()?;
         let score = |pair: &Pair| self.score(pair, protocol.as_ref(), &networks);
         let scored = pairs::each(&pairs, context, score)?;
-        warn_of_backgrounds(&scored, context);
+        if let Some(warning) = over_another_background(&scored) {
+            context.note(format!("warning: {warning}"));
+        }
         warn_of_missing(&scored, protocol.as_ref(), context)?;
         match (folders, self.format.as_str()) {
             (false, "json") => emit_json(&scored[0])?,
@@ -162,17 +164,17 @@ fn lpips_variants(
     Ok(LpipsVariant::ALL.map(value).into())
 }
 
-fn warn_of_backgrounds(scored: &[Scored], context: Context) {
+/// What is wrong if renders evidently lie over something else.
+fn over_another_background(scored: &[Scored]) -> Option<String> {
     let mut others = scored.iter().filter(|frame| frame.over_another_background);
-    if let Some(first) = others.next() {
-        context.note(format!(
-            "warning: the background of {} of {} renders ({}) is not the one under the truth; --background R,G,B \
-             changes the latter",
-            1 + others.count(),
-            scored.len(),
-            first.name
-        ));
-    }
+    let first = others.next()?;
+    Some(format!(
+        "The background of {} of {} renders ({}) is not the one under the truth: not the protocol's numbers; --background \
+         R,G,B changes the latter",
+        1 + others.count(),
+        scored.len(),
+        first.name
+    ))
 }
 
 /// Frames without a score under the protocol; it is an error if none has one.
@@ -205,7 +207,11 @@ fn emit_folder(scored: &[Scored], protocol: Option<&Protocol>, format: &str) -> 
 /// For people, what was asked for: the protocol's scores alone, if there is one. For programs, everything.
 fn table(scored: &[Scored], means: Option<&Means>, summary: Option<&Summary>, format: &str) -> Table {
     match scored.iter().find_map(|frame| frame.protocol.as_ref()) {
-        Some(score) if format != "csv" => summary::under_protocol(&score.protocol, scored, summary),
+        Some(score) if format != "csv" => {
+            let mut table = summary::under_protocol(&score.protocol, scored, summary);
+            table.sentences.extend(over_another_background(scored));
+            table
+        }
         _ => summary::table(scored, means, summary),
     }
 }

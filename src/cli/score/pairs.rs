@@ -38,6 +38,9 @@ pub(super) fn single(render: &Path, truth: &Path, mask: Option<&Path>) -> Result
 
 /// The frames of two folders by name, sorted.
 pub(super) fn folders(render: &Path, truth: &Path, mask: Option<&Path>) -> Result<Vec<Pair>> {
+    if let Some(file) = [Some(render), mask].into_iter().flatten().find(|path| path.is_file()) {
+        bail!("{}: a file; expected a folder, as {} is", file.display(), truth.display());
+    }
     let (renders, truths) = (frames_of(render)?, frames_of(truth)?);
     same_names(render, &renders, truth, &truths)?;
     let masks = mask.map(|folder| masks_of(folder, truth, &truths)).transpose()?;
@@ -60,7 +63,7 @@ pub(super) fn each<T: Send>(
     for some in pairs.chunks(2 * rayon::current_num_threads()) {
         let score = |pair: &Pair| {
             let scored = score(pair);
-            watch.see(Event::FrameDone);
+            watch.see(Event::FrameDone(pair.name.clone()));
             scored
         };
         scored.extend(some.par_iter().map(score).collect::<Result<Vec<T>>>()?);
@@ -129,7 +132,9 @@ type Frames = BTreeMap<String, PathBuf>;
 fn frames_of(folder: &Path) -> Result<Frames> {
     let mut frames = BTreeMap::new();
     for path in listing::files(folder, "frames", &["png", "jpg", "jpeg", "npy"])? {
-        let Some(stem) = path.file_stem().and_then(|s| s.to_str()) else { continue };
+        let Some(stem) = path.file_stem().and_then(|s| s.to_str()) else {
+            bail!("{}: a name that is no Unicode; expected names of frames", path.display());
+        };
         if let Some(other) = frames.insert(stem.to_owned(), path.clone()) {
             bail!("{} and {}: one name; expected one image per frame", other.display(), path.display());
         }
@@ -140,28 +145,36 @@ fn frames_of(folder: &Path) -> Result<Frames> {
     Ok(frames)
 }
 
-/// The masks of a folder by the names of the truths: their own, or, where no name is one of a truth, the truth with the same
-/// number (`mask_0010` for `image_0010`).
+/// The masks of a folder by the names of the truths: their own, or, where no name is one of a truth, the truth with the same last
+/// number (`mask_0010` for `image_10`). Masks of other frames are left alone.
 fn masks_of(folder: &Path, truth: &Path, truths: &Frames) -> Result<Frames> {
     let masks = frames_of(folder)?;
-    if !masks.keys().any(|name| truths.contains_key(name)) {
-        let numbers: BTreeMap<&str, &PathBuf> =
-            masks.iter().filter_map(|(name, path)| Some((number(name)?, path))).collect();
-        let of_truth = |name: &String| Some((name.clone(), PathBuf::clone(numbers.get(number(name)?)?)));
-        let named: Frames = truths.keys().filter_map(of_truth).collect();
-        if numbers.len() == masks.len() && masks.len() == truths.len() && named.len() == masks.len() {
-            return Ok(named);
-        }
+    let by_name = masks.keys().any(|name| truths.contains_key(name));
+    let mut numbered: BTreeMap<u64, Vec<&PathBuf>> = BTreeMap::new();
+    for (name, path) in masks.iter().filter(|_| !by_name) {
+        number(name).into_iter().for_each(|number| numbered.entry(number).or_default().push(path));
     }
-    same_names(folder, &masks, truth, truths)?;
-    Ok(masks)
+    let mut found = Frames::new();
+    for name in truths.keys() {
+        let of_number = || match numbered.get(&number(name)?)?.as_slice() {
+            [one] => Some(PathBuf::clone(one)),
+            _ => None,
+        };
+        let mask = if by_name { masks.get(name).cloned() } else { of_number() };
+        let Some(mask) = mask else {
+            let rule = "a mask of the frame's name, or, where no mask has one, one mask with its last number";
+            bail!("{}: no mask for frame {name} of {}; expected {rule}", folder.display(), truth.display());
+        };
+        found.insert(name.clone(), mask);
+    }
+    Ok(found)
 }
 
-/// The last digits of a name.
-fn number(name: &str) -> Option<&str> {
+/// The last number in a name.
+fn number(name: &str) -> Option<u64> {
     let end = name.rfind(|c: char| c.is_ascii_digit())? + 1;
     let start = name[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
-    name.get(start..end)
+    name.get(start..end)?.parse().ok()
 }
 
 fn same_names(left: &Path, a: &Frames, right: &Path, b: &Frames) -> Result<()> {

@@ -66,9 +66,14 @@ pub(super) fn parse(specification: &str) -> Result<Recipe, Error> {
     table.entry("pose").or_insert(complete(Value::try_from(&base.pose))?);
     let mut varied = false;
     for part in parts {
-        let expected = || "FIELD=VALUE with a field of recipes.toml, such as rates.rotation=0.01".to_owned();
-        let (path, value) = part.split_once('=').ok_or_else(|| refuse(format!("`{part}`"), expected()))?;
-        let slot = slot(&mut table, path).ok_or_else(|| refuse(format!("no field `{path}`"), expected()))?;
+        let expected = |path: &str, table: &Table| {
+            let known = fields(table, "");
+            format!("FIELD=VALUE, such as rates.rotation=0.01, with {}", one_of(path, &known))
+        };
+        let (path, value) =
+            part.split_once('=').ok_or_else(|| refuse(format!("`{part}`"), expected(part, &table)))?;
+        let known = expected(path, &table);
+        let slot = slot(&mut table, path).ok_or_else(|| refuse(format!("no field `{path}`"), known))?;
         *slot = value_of(value);
         varied = true;
     }
@@ -103,6 +108,17 @@ fn slot<'t>(table: &'t mut Table, path: &str) -> Option<&'t mut Value> {
         (Value::Table(_), None) | (_, Some(_)) => None,
         (value, None) => Some(value),
     }
+}
+
+/// Every field that [`slot`] finds, as it is written.
+fn fields(table: &Table, before: &str) -> Vec<String> {
+    let choices = table.iter().filter(|(name, _)| !["id", "title", "source"].contains(&name.as_str()));
+    choices
+        .flat_map(|(name, value)| match value {
+            Value::Table(inner) => fields(inner, &format!("{before}{name}.")),
+            _ => vec![format!("{before}{name}")],
+        })
+        .collect()
 }
 
 /// A TOML value, or text that needs no quotes.
