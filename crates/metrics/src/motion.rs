@@ -75,7 +75,7 @@ mod tests {
         let everywhere = columns(0..SIZE);
         let level = |k: u8| grey(move |_, _| f32::from(k) / 255.0);
         let ramp = grey(|x, y| (x + y) as f32 / 255.0);
-        let of = |now, before| flicker("default", now, before, [&everywhere; 2]);
+        let of = |now: [&Image; 2], before: [&Image; 2]| flicker("default", now, before, [&everywhere; 2]);
         // A constant error moves with the truth.
         assert_eq!(of([&level(60), &level(50)], [&level(30), &level(20)]), 0.0);
         assert_eq!(of([&ramp, &ramp], [&level(9), &level(9)]), 0.0);

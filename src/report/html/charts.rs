@@ -13,6 +13,8 @@ const POINTS: usize = 1500;
 
 /// Points of a series over the bend, each of which is drawn by itself.
 const POINTS_APART: usize = 300;
+/// Points of a line up to which each is marked (`skinsplat-page`).
+const MARKED: usize = 400;
 /// The views of a chart.
 const VIEWS: [&str; 2] = ["over frames", "over bend"];
 
@@ -73,9 +75,15 @@ impl Charted<'_> {
         let variants = &self.sequence.variants;
         let longest = variants.iter().map(|variant| variant.frames.len()).max()?;
         let every = longest.div_ceil(most).max(1);
+        let mut notes: Vec<String> = Vec::new();
         if every > 1 {
-            chart = chart.note(format!("One frame in {every} is drawn."));
+            notes.push(format!("One frame in {every} is drawn."));
         }
+        let drawn = || variants.iter().flat_map(|variant| variant.frames.iter().step_by(every));
+        if longest.div_ceil(every) <= MARKED && drawn().any(|frame| self.shown(frame) == Some(false)) {
+            notes.push("Pictures of hollow points were left out to keep the page small.".to_owned());
+        }
+        chart = chart.note(notes.join(" "));
         let mut any = false;
         for variant in variants {
             let frames = variant.frames.iter().step_by(every);
@@ -85,6 +93,11 @@ impl Charted<'_> {
             chart = chart.with(Series::new(&variant.label, points));
         }
         any.then_some(chart)
+    }
+
+    /// Whether the page has pictures of a frame; none if the run kept none.
+    fn shown(&self, frame: &FrameResult) -> Option<bool> {
+        self.links.shown(&self.results.experiment, &self.sequence.id, &frame.name)
     }
 
     /// The score of a frame, which leads to its pictures where the page has them.
@@ -99,7 +112,7 @@ impl Charted<'_> {
         let digits = metric.decimals() + 1;
         let point =
             Point::new(x, value).titled(format!("{}, {}: {value:.digits$}", variant.label, frame.name));
-        Some(match self.links.shown(&self.results.experiment, &self.sequence.id, &frame.name) {
+        Some(match self.shown(frame) {
             Some(true) => point.to(&self.sequence.label, &frame.name),
             Some(false) => point.without_picture("its picture was left out to keep the page small"),
             None => point,
