@@ -195,3 +195,26 @@ fn files_are_opened_in_one_place() {
         }
     }
 }
+
+/// The Python package compiles the command line into itself, apart from what the tests build: its manifest has to name whatever
+/// `src/cli` uses.
+#[test]
+fn the_python_package_has_every_library_of_the_command_line() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let names = |manifest: &str| -> Vec<String> {
+        let text = std::fs::read_to_string(root.join(manifest)).unwrap();
+        let table: toml::Table = text.parse().unwrap();
+        table["dependencies"].as_table().unwrap().keys().cloned().collect()
+    };
+    let mut files = Vec::new();
+    sources(&root.join("src/cli"), &mut files);
+    let text: String = files.iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();
+    let python = names("python/Cargo.toml");
+    let used = names("Cargo.toml").into_iter().filter(|name| {
+        let path = format!("{}::", name.replace('-', "_"));
+        text.match_indices(&path)
+            .any(|(at, _)| !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_'))
+    });
+    let missing: Vec<String> = used.filter(|name| !python.contains(name)).collect();
+    assert!(missing.is_empty(), "python/Cargo.toml: no {missing:?}");
+}

@@ -1,6 +1,7 @@
 //! `reproduce demo`: what the program does, before anything is set up.
 
 use super::data::Data;
+use super::products::{MARKDOWN, Printed};
 use super::quoting::quoted;
 use super::run::Run;
 use super::{Context, Exit};
@@ -19,6 +20,8 @@ pub(super) struct Demo {
     /// Folder to write to
     #[arg(long, value_name = "DIR", default_value = "runs/demo")]
     out: PathBuf,
+    #[command(flatten)]
+    printed: Printed,
 }
 
 const EXAMPLES: &str = "\
@@ -53,6 +56,9 @@ impl Demo {
         let words =
             ["demo", "--subject", if rendered { RENDERED } else { GENERATED }, "--limit", "3", "--images"];
         let mut arguments: Vec<OsString> = words.map(OsString::from).into();
+        if self.printed.format != MARKDOWN {
+            arguments.extend(["--format".into(), self.printed.format.clone().into()]);
+        }
         for (option, path) in [("--html", &page), ("--out", &self.out)] {
             arguments.extend([option.into(), path.into()]);
         }

@@ -1,7 +1,9 @@
 //! `reproduce merge`: what several machines computed, as one run.
 
 use super::output::emit;
-use super::products::{make_folder, verdict, write_bend, write_curves, write_results, write_text};
+use super::products::{
+    Printed, make_folder, printed, verdict, write_bend, write_curves, write_results, write_text,
+};
 use super::{Context, Exit};
 use anyhow::{Result, bail};
 use skinsplat::experiment::{CodeVersions, FrameRecord};
@@ -25,6 +27,8 @@ pub(super) struct Merge {
     /// Folder to write to [default: the folder of the slices, if it is one]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    printed: Printed,
 }
 
 const AFTER: &str = "\
@@ -73,7 +77,7 @@ impl Merge {
         write_curves(out, &merged.file.plan, &merged.file.experiments, &self.folders)?;
         write_bend(out, &results)?;
         write_text(&out.join("run.json"), &(serde_json::to_string_pretty(&report_of(&merged))? + "\n"))?;
-        emit(&report::page(&results))?;
+        emit(&printed(&results, &self.printed.format))?;
         self.say(out, &merged, context);
         Ok(verdict(&merged.file.plan, merged.missing.len(), &merged.file.left_out, context))
     }

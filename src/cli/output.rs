@@ -52,6 +52,26 @@ pub(super) enum Format {
     Json,
 }
 
+/// How a command prints a page that it also writes in every format.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum PageFormat {
+    /// GitHub-flavoured Markdown.
+    #[default]
+    Markdown,
+    /// For programs: one JSON document.
+    Json,
+}
+
+impl PageFormat {
+    /// The text of the two that is wanted.
+    pub(super) fn of<'a>(self, markdown: &'a str, json: &'a str) -> &'a str {
+        match self {
+            Self::Markdown => markdown,
+            Self::Json => json,
+        }
+    }
+}
+
 /// The formats of tables, for `--format`.
 pub(super) fn table_format() -> PossibleValuesParser {
     let value = |format: &TableFormat| PossibleValue::new(format.id).help(format.about);

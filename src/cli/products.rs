@@ -1,5 +1,6 @@
 //! What a run leaves in its folder, whoever collected the records: tables, curves, verdict.
 
+use super::output::{table_format, written};
 use super::{Context, Exit};
 use anyhow::Result;
 use skinsplat::experiment::{Experiment, Plan};
@@ -7,7 +8,7 @@ use skinsplat::report;
 use skinsplat::run::plan_file::LeftOut;
 use skinsplat::run::{self, Error};
 use skinsplat_data::atomic;
-use skinsplat_table::Format;
+use skinsplat_table::{Format, to_json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +29,29 @@ pub(super) fn write_results(folder: &Path, results: &report::Results) -> Result<
         }
     }
     Ok(())
+}
+
+/// The format in which tables are printed, as an argument of whoever prints all of them.
+#[derive(Debug, clap::Args)]
+pub(super) struct Printed {
+    /// How to print the tables
+    #[arg(long, value_name = "FORMAT", value_parser = table_format(), default_value = MARKDOWN)]
+    pub(super) format: String,
+}
+
+/// Tables with what is said around them, as in tables.md.
+pub(super) const MARKDOWN: &str = "markdown";
+/// All tables as one document.
+pub(super) const JSON: &str = "json";
+
+/// All tables in a format.
+pub(super) fn printed(results: &report::Results, format: &str) -> String {
+    let tables = results.tables.iter().map(|table| &table.table);
+    match format {
+        MARKDOWN => report::page(results),
+        JSON => to_json(&tables.collect::<Vec<_>>()),
+        format => tables.map(|table| written(table, format)).collect::<Vec<_>>().join("\n"),
+    }
 }
 
 /// How the fits went, if there were any, from the reports beside the avatars in some runs' folders.

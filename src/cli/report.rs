@@ -3,6 +3,7 @@
 use super::compare::{Comparing, check_tables, folder, load, only};
 use super::output::{emit, save, written};
 use super::page::{Images, page, write_page};
+use super::products::{MARKDOWN, printed};
 use super::selection::read_json;
 use super::{Context, Exit};
 use anyhow::{Result, bail};
@@ -83,14 +84,9 @@ impl Report {
 
     /// The tables in the wanted format.
     fn tables(&self, results: &Results) -> Result<String> {
-        let tables = results.tables.iter().map(|table| &table.table);
         Ok(match self.format(MARKDOWN) {
-            // With what is said around the tables, as in tables.md.
-            MARKDOWN => report::page(results),
             HTML => page(results, folder(&self.run), self.images)?,
-            // One document.
-            "json" => to_json(&tables.collect::<Vec<_>>()),
-            format => tables.map(|table| written(table, format)).collect::<Vec<_>>().join("\n"),
+            format => printed(results, format),
         })
     }
 
@@ -130,9 +126,6 @@ struct Timed {
 
 /// The format of pages, beside those of tables.
 const HTML: &str = "html";
-
-/// The format of tables, unless another is asked for.
-const MARKDOWN: &str = "markdown";
 
 fn formats() -> PossibleValuesParser {
     let html = PossibleValue::new(HTML).help("one page for a browser, with charts and pictures");

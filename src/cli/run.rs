@@ -1,14 +1,17 @@
 //! `reproduce run`: the main job.
 
-use super::output::emit;
+use super::output::{emit, written};
 use super::page::{Images, PICTURES, page, write_page};
 use super::planning::{Planned, Planning};
-use super::products::{AVATARS, make_folder, verdict, write_bend, write_curves, write_results, write_text};
+use super::products::{
+    AVATARS, JSON, MARKDOWN, Printed, make_folder, printed, verdict, write_bend, write_curves, write_results,
+    write_text,
+};
 use super::quoting::quoted;
 use super::{Context, Exit, progress::Watch};
 use anyhow::{Context as _, Result};
 use skinsplat::experiment::{Job, Records, Shard, Unreadable};
-use skinsplat::report::{self, Results};
+use skinsplat::report::{self, Results, TableResults};
 use skinsplat::run::motion::{self, Motion};
 use skinsplat::run::pictures;
 use skinsplat::run::plan_file::{LeftOut, PlanFile};
@@ -63,6 +66,8 @@ pub(super) struct Run {
     /// none but the reports of fits, for small folders
     #[arg(long, value_enum, value_name = "WHICH", default_value_t, conflicts_with = "shard")]
     keep: KeepAvatars,
+    #[command(flatten)]
+    printed: Printed,
     /// Forget what the folder's results store knows
     #[arg(long, conflicts_with = "shard")]
     fresh: bool,
@@ -155,7 +160,7 @@ impl Run {
         run::check(&left, library)?;
         if self.shard.is_some() {
             PlanFile::new(plan, experiments, left_out(planned)).write(&self.out)?;
-        } else {
+        } else if self.printed.format == MARKDOWN {
             emit(&report::head(&report::results(plan, experiments, &Records::default())?))?;
         }
         let path = self.out.join(self.store_name());
@@ -172,11 +177,20 @@ impl Run {
             drop(watch);
             if self.shard.is_none() {
                 let results = report::table_results(plan, index, experiments, &self.records()?)?;
-                emit(&format!("\n{}", report::markdown(&results)))?;
+                self.print(&results)?;
                 tables.push(results);
             }
         }
         Ok((left.len(), self.shard.is_none().then(|| report::results_of(plan, tables))))
+    }
+
+    /// Prints a table that is done, but as a part of the one document that JSON is.
+    fn print(&self, results: &TableResults) -> Result<()> {
+        match self.printed.format.as_str() {
+            MARKDOWN => emit(&format!("\n{}", report::markdown(results))),
+            JSON => Ok(()),
+            format => emit(&written(&results.table, format)),
+        }
     }
 
     /// What is known of the folder's frames.
@@ -222,7 +236,11 @@ impl Run {
         if let Some(motion) = motion {
             self.write_motion(planned, motion, context)?;
         }
-        emit(&report::incomplete(results))?;
+        match self.printed.format.as_str() {
+            MARKDOWN => emit(&report::incomplete(results))?,
+            JSON => emit(&printed(results, JSON))?,
+            _ => {}
+        }
         let out = self.out.display();
         context.note(format!("{out}: tables.md, results.json and more, in {:.1} s", provenance.seconds));
         let missing = results.missing();

@@ -1,6 +1,6 @@
 //! `reproduce stress`: numerical stability at the extremes.
 
-use super::output::emit;
+use super::output::{PageFormat, emit};
 use super::products::make_folder;
 use super::progress::Watch;
 use super::{Context, Exit};
@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Stress {
+    /// How to print what was found
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t)]
+    format: PageFormat,
     /// Folder to write to; it is made if it is missing
     #[arg(long, value_name = "DIR", default_value = "runs/stress")]
     out: PathBuf,
@@ -74,12 +77,12 @@ impl Stress {
         });
         let html = stress::page(&report, &shown.collect::<Result<Vec<_>>>()?).html();
         write(&out.join("stress.html"), &html)?;
-        let markdown = report.markdown();
+        let (markdown, json) = (report.markdown(), report.json());
         write(&out.join("stress.csv"), &report.csv())?;
-        write(&out.join("stress.json"), &report.json())?;
+        write(&out.join("stress.json"), &json)?;
         write(&out.join("stress.md"), &markdown)?;
         if !context.quiet {
-            emit(&markdown)?;
+            emit(self.format.of(&markdown, &json))?;
         }
         Ok(Exit::Success)
     }

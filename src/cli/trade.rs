@@ -1,7 +1,7 @@
 //! `reproduce trade`: what every choice costs, and how far it is from the exact answer.
 
 use super::data::Data;
-use super::output::emit;
+use super::output::{PageFormat, emit};
 use super::products::make_folder;
 use super::progress::Watch;
 use super::{Context, Exit};
@@ -30,6 +30,9 @@ const DEFAULT_SUBJECT: &str = "synthetic/ring_stripes";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Trading {
+    /// How to print what was found
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t)]
+    format: PageFormat,
     /// What to measure on: the ids of a data set and of a subject (see `reproduce list datasets`), or a subject's alone
     /// [default: a built-in subject, or the first of --data]
     #[arg(value_name = "DATASET/SUBJECT")]
@@ -110,7 +113,7 @@ impl Trading {
         drop(watch);
         let page = self.write(&result, &sweeps)?;
         if !context.quiet {
-            emit(&page)?;
+            emit(self.format.of(&page, &trade::json(&result)))?;
         }
         Ok(Exit::Success)
     }

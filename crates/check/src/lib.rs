@@ -122,11 +122,13 @@ struct Seen {
     shadows: Result<Shadows, Problem>,
 }
 
+/// Where a body of another size would stay, pixels: its middle, and the origin of its model; none behind the camera.
+type Centres = [Option<[f64; 2]>; 2];
+
 struct Shadows {
     mask: Shadow,
     body: Shadow,
-    /// Where a body of another size would stay, pixels: its middle, and the origin of its model.
-    centres: [Option<[f64; 2]>; 2],
+    centres: Centres,
 }
 
 struct Problem {
@@ -185,7 +187,7 @@ fn project(
     sequence: &Sequence,
     index: usize,
     camera: &Camera,
-) -> Result<(Mask, [Option<[f64; 2]>; 2]), skinsplat_core::scene::SceneError> {
+) -> Result<(Mask, Centres), skinsplat_core::scene::SceneError> {
     let pose = &sequence.poses[sequence.frames[index].pose];
     let body = PosedBody::new(&sequence.body, pose)?;
     let mesh = body.mesh();
