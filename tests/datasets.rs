@@ -219,7 +219,7 @@ fn the_embedded_registry_names_what_is_there() {
     );
     let error = registry.get("nothing").unwrap_err().to_string();
     assert!(
-        error.contains("datasets.toml: dataset: no id \"nothing\"; expected one of: synthetic,"),
+        error.contains("datasets.toml: dataset: no id \"nothing\"; expected one of synthetic,"),
         "{error}"
     );
 }

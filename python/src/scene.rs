@@ -75,7 +75,7 @@ impl Avatar {
             return Err(invalid(format!("opacities[{i}]: {}; expected 0 to 1", opacities[i])));
         }
         let scales = values(&scales, "scales", &[3])?.0;
-        if let Some(i) = scales.iter().position(|s| !(*s >= 0.0)) {
+        if let Some(i) = scales.iter().position(|s| s.is_nan() || *s < 0.0) {
             return Err(invalid(format!("scales[{}]: {}; expected metres, 0 or more", i / 3, scales[i])));
         }
         let gaussians = Gaussians {
@@ -297,8 +297,9 @@ impl Camera {
         world_to_camera: PyArrayLikeDyn<'_, f64, AllowTypeChange>,
     ) -> PyResult<Self> {
         let (matrix, _) = values(&world_to_camera, "world_to_camera", &[4, 4])?;
-        let matrix: [f64; 16] =
-            matrix.try_into().map_err(|_| invalid("world_to_camera: several matrices; expected (4, 4)"))?;
+        let matrix: [f64; 16] = matrix
+            .try_into()
+            .map_err(|_several| invalid("world_to_camera: several matrices; expected (4, 4)"))?;
         let camera_from_world = DMat4::from_cols_array(&matrix).transpose();
         let camera = scene::Camera { width, height, fx, fy, cx, cy, camera_from_world };
         camera.validate().map_err(invalid)?;

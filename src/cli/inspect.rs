@@ -48,7 +48,9 @@ impl Inspect {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         let text = match extension.as_str() {
             _ if path.is_dir() => folder::text(path)?,
-            _ if !path.exists() => bail!("{}: not there; expected a file or folder", path.display()),
+            _ if !path.exists() => {
+                bail!("{}: No such file or folder; expected one to look at", path.display())
+            }
             "ply" | "pth" | "pt" | "ckpt" | "spz" | "splat" | "ksplat" | "sog" => {
                 avatar_text(&read_avatar(path)?)
             }
