@@ -46,6 +46,7 @@ fn the_experiments_load_from_the_folder_and_are_the_embedded_ones() {
         "bend",
         "budget",
         "ci",
+        "demo",
         "engines",
         "lights",
         "noise",
