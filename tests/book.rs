@@ -1,6 +1,7 @@
 //! The pages of `docs/`: every command that they show is run, and prints what they say.
 //!
 //! `SKINSPLAT_BOOK=write cargo test --test book` writes into the pages what the program prints now.
+#![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 use std::fmt::Write;
