@@ -1,7 +1,7 @@
 //! `reproduce demo`: what the program does, before anything is set up.
 
 use super::data::Data;
-use super::products::{MARKDOWN, Printed};
+use super::products::{MARKDOWN, Printed, kept_in};
 use super::quoting::quoted;
 use super::run::Run;
 use super::{Context, Exit};
@@ -43,10 +43,7 @@ struct Command {
 impl Demo {
     /// How to go on after the demo was stopped.
     pub(super) fn advice(&self) -> String {
-        format!(
-            "what is done is kept in {}; the same command goes on from there",
-            quoted(self.out.as_os_str())
-        )
+        kept_in(&self.out)
     }
 
     pub(super) fn run(&self, context: Context) -> Result<Exit> {

@@ -1,6 +1,7 @@
 //! What a run leaves in its folder, whoever collected the records: tables, curves, verdict.
 
 use super::output::{table_format, written};
+use super::quoting::quoted;
 use super::{Context, Exit};
 use anyhow::Result;
 use skinsplat::experiment::{Experiment, Plan};
@@ -29,6 +30,12 @@ pub(super) fn write_results(folder: &Path, results: &report::Results) -> Result<
         }
     }
     Ok(())
+}
+
+/// How to go on after a run into a folder was stopped.
+pub(super) fn kept_in(folder: &Path) -> String {
+    let folder = quoted(folder.as_os_str());
+    format!("what is done is kept in {folder}; the same command goes on from there")
 }
 
 /// The format in which tables are printed, as an argument of whoever prints all of them.

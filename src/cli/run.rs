@@ -4,10 +4,9 @@ use super::output::{emit, written};
 use super::page::{Images, PICTURES, page, write_page};
 use super::planning::{Planned, Planning};
 use super::products::{
-    AVATARS, JSON, MARKDOWN, Printed, make_folder, printed, verdict, write_bend, write_curves, write_results,
-    write_text,
+    AVATARS, JSON, MARKDOWN, Printed, kept_in, make_folder, printed, verdict, write_bend, write_curves,
+    write_results, write_text,
 };
-use super::quoting::quoted;
 use super::{Context, Exit, progress::Watch};
 use anyhow::{Context as _, Result};
 use skinsplat::experiment::{Job, Records, Shard, Unreadable};
@@ -112,10 +111,7 @@ impl Run {
 
     /// How to go on after the run was stopped.
     pub(super) fn advice(&self) -> String {
-        format!(
-            "what is done is kept in {}; the same command goes on from there",
-            quoted(self.out.as_os_str())
-        )
+        kept_in(&self.out)
     }
 
     pub(super) fn run(&self, context: Context) -> Result<Exit> {

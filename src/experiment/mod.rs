@@ -26,6 +26,7 @@ mod seeds;
 mod shard;
 mod slices;
 mod spec;
+mod subset;
 mod validate;
 mod versions;
 

@@ -2,13 +2,13 @@
 
 use super::avatar::{PlannedAvatar, Planner};
 use super::rows::{DataRow, Source, rows_of};
+use super::subset::{subjects_are_of_a_table, subset_names_something};
 use super::{
     CodeVersions, Dataset, Error, Experiment, Options, PoseNoise, SequenceInfo, Shard, Slices, SubjectInfo,
     Unreadable, Variant, catalog,
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::json;
-use skinsplat_core::choice::one_of;
 use skinsplat_data::key::content_key;
 use skinsplat_fit::options::PoseFit;
 use skinsplat_metrics::{MetricId, Protocol, ProtocolId};
@@ -451,54 +451,4 @@ fn time_steps(sequence: &SequenceInfo) -> Vec<usize> {
 /// The sequence of this id, which rows take from their subject.
 pub(super) fn find_sequence<'a>(subject: &'a SubjectInfo, id: &str) -> &'a SequenceInfo {
     subject.sequences.iter().find(|sequence| sequence.id == id).expect("rows name sequences of their subject")
-}
-
-/// Refuses subjects of whom none belongs to any of the tables, where others do.
-fn subjects_are_of_a_table(
-    experiments: &[Experiment],
-    datasets: &[Dataset],
-    options: &Options,
-) -> Result<(), Error> {
-    let asked = &options.subset.subjects;
-    let everybody = Options {
-        subset: super::Subset { subjects: Vec::new(), ..options.subset.clone() },
-        ..options.clone()
-    };
-    let rows = experiments.iter().flat_map(|experiment| rows_of(experiment, datasets, &everybody).1);
-    let known: BTreeSet<String> = rows.filter(|row| row.missing.is_none()).map(|row| row.subject).collect();
-    if asked.is_empty() || known.is_empty() || asked.iter().any(|id| known.contains(id)) {
-        return Ok(());
-    }
-    let ids: Vec<&str> = experiments.iter().map(|experiment| experiment.id.as_str()).collect();
-    let problem = format!("`{}`: not among the data of {}", asked.join("`, `"), ids.join(", "));
-    let known: Vec<String> = known.into_iter().collect();
-    Err(Error::invalid("subset", "subjects", problem, one_of(&asked[0], &known)))
-}
-
-/// Refuses a subset that would leave nothing because of a name that does not exist.
-fn subset_names_something(
-    experiments: &[Experiment],
-    datasets: &[Dataset],
-    options: &Options,
-) -> Result<(), Error> {
-    let subjects: BTreeSet<&str> =
-        datasets.iter().flat_map(|d| &d.subjects).map(|subject| subject.id.as_str()).collect();
-    let variants: BTreeSet<&str> =
-        experiments.iter().flat_map(|e| &e.variants).flat_map(Variant::names).collect();
-    let subset = &options.subset;
-    for (key, asked, known) in
-        [("subjects", &subset.subjects, subjects), ("variants", &subset.variants, variants)]
-    {
-        if let Some(stranger) = asked.iter().find(|id| !known.contains(id.as_str())) {
-            let broken = datasets.iter().flat_map(|d| &d.unreadable).find(|own| own.subject == *stranger);
-            if let (Some(broken), true) = (broken, key == "subjects") {
-                let problem = format!("`{stranger}` cannot be loaded: {}", broken.problem);
-                return Err(Error::invalid("subset", key, problem, "a subject that can be loaded"));
-            }
-            let known: Vec<&str> = known.into_iter().collect();
-            let expected = one_of(stranger, &known);
-            return Err(Error::invalid("subset", key, format!("`{stranger}`"), expected));
-        }
-    }
-    Ok(())
 }

@@ -60,3 +60,20 @@ fn a_subject_of_another_kind_of_capture_is_refused() {
     }
     desk.run(args!["run", "table1", "--limit", "0"]).refuses(&["--limit", "0"], "no frame");
 }
+
+/// Whatever prints tables prints them in the formats of `report`.
+#[test]
+fn tables_are_printed_in_every_format() {
+    let desk = Desk::new();
+    desk.put("tiny.toml", include_str!("tiny.toml"));
+    let run = |format: &str| args!["run", "tiny.toml", "--limit", "1", "--out", "run", "--format", format];
+    for format in ["markdown", "json", "csv", "latex", "text"] {
+        let printed = desk.ok(run(format));
+        assert_eq!(printed, desk.ok(args!["report", "run", "--format", format]), "{format}");
+    }
+    desk.ok(args!["run", "tiny.toml", "--limit", "1", "--out", "slices", "--shard", "1/1"]);
+    assert_eq!(desk.ok(args!["merge", "slices", "--format", "json"]), desk.ok(run("json")));
+    let stress = desk.ok(args!["stress", "--quick", "--only", "averages", "--out", "s", "--format", "json"]);
+    assert_eq!(stress, desk.read("s/stress.json"));
+    desk.run(run("word")).refuses(&["--format", "word", "markdown"], "no format");
+}

@@ -83,6 +83,16 @@ fn folders_pair_up_by_name() {
     assert_eq!(found["protocol"]["frames"], 2, "{}", found["protocol"]);
     let text = desk.ok(args!["score", "renders", "truths", "--protocol", "3dgs"]);
     assert!(text.contains("Protocol 3dgs@1.") && text.contains("mean of 2"), "{text}");
+    assert_eq!(
+        desk.ok(args!["score", "renders", "truths", "--protocol", "3dgs@1"]),
+        text,
+        "as it is printed"
+    );
+    for (protocol, parts) in
+        [("3dgs@7", ["version 7", "version 1"]), ("3dgs+ssim=x+ssim=y", ["twice", "once"])]
+    {
+        desk.run(args!["score", "renders", "truths", "--protocol", protocol]).refuses(&parts, protocol);
+    }
     let csv = desk.ok(args!["score", "renders", "truths", "--protocol", "3dgs", "--format", "csv"]);
     let line = csv.lines().find(|line| line.starts_with("mean of 2 frames,psnr,mean,")).unwrap();
     assert_eq!(line.split(',').nth(3).unwrap().parse::<f64>().unwrap(), mean);
