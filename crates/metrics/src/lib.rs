@@ -12,6 +12,7 @@ pub mod psnr;
 pub mod region;
 pub mod score;
 pub mod ssim;
+pub mod truth;
 pub mod variants;
 
 pub use aggregate::{Aggregation, Summary};
@@ -26,8 +27,9 @@ pub use planes::Planes;
 pub use protocol::{Background, Clamp, PROTOCOLS, Protocol, ProtocolId, Quantisation};
 pub use psnr::{ErrorSums, PsnrVariant};
 pub use region::Region;
-pub use score::{FrameScore, Prepared, Truth, Wanted};
+pub use score::{FrameScore, Prepared, Wanted};
 pub use ssim::{SsimSettings, SsimVariant, ssim};
+pub use truth::Truth;
 pub use variants::{VARIANT_IDS, all_variants};
 
 /// Version of this code as part of content keys. Raise it by hand, with a line in CHANGELOG.md, whenever a change moves
