@@ -204,6 +204,21 @@ fn a_render_over_another_background_is_warned_of() {
     assert!(!all.contains("hugs-full: 1 of"), "{all}");
 }
 
+/// A frame that a protocol cannot score is not in its mean, and the mean says so.
+#[test]
+fn a_mean_says_of_how_many_frames_it_is() {
+    let desk = Desk::new();
+    let truth = Image::filled(WIDTH, HEIGHT, [0.4, 0.5, 0.6]);
+    for (name, alpha) in [("a.png", 1.0), ("b.png", 0.0)] {
+        let path = desk.put(&format!("truths/{name}"), "");
+        frames::save_png_with_alpha(&path, &truth, &Mask::filled(WIDTH, HEIGHT, alpha)).unwrap();
+        frames::save_png(&desk.put(&format!("renders/{name}"), ""), &truth).unwrap();
+    }
+    let text = desk.ok(args!["score", "renders", "truths", "--protocol", "hugs-human"]);
+    assert!(text.contains("mean of 1 of 2") && text.matches("holds no pixel").count() == 1, "{text}");
+    assert!(desk.ok(args!["score", "renders", "truths", "--protocol", "hugs-full"]).contains("mean of 2  "));
+}
+
 #[test]
 fn images_below_the_size_of_the_network_have_no_lpips() {
     let desk = Desk::new();

@@ -48,8 +48,7 @@ pub(super) fn under_protocol(protocol: &ProtocolId, scored: &[Scored], summary: 
         let notes = &mut table.notes;
         let cell = |metric: MetricId| match value(metric) {
             Ok(value) => Cell::number(value, digits(metric)),
-            Err(why) => {
-                let note = format!("{} not computed: {why}", metric.title());
+            Err(note) => {
                 Cell { notes: vec![index(notes, &note)], ..Cell::new(Content::NotComputed, digits(metric)) }
             }
         };
@@ -58,17 +57,27 @@ pub(super) fn under_protocol(protocol: &ProtocolId, scored: &[Scored], summary: 
     };
     for frame in scored {
         add(&frame.name, RowKind::Measured, &|metric| match &frame.protocol {
-            Some(score) => score.values.get(metric).ok_or_else(|| reason(&score.not_computed, metric)),
-            None => Err(frame.protocol_not_computed.clone().unwrap_or_default()),
+            Some(score) => score.values.get(metric).ok_or_else(|| without(&score.not_computed, metric)),
+            None => {
+                Err(format!("not computed: {}", frame.protocol_not_computed.as_deref().unwrap_or_default()))
+            }
         });
     }
     if let Some(summary) = summary {
-        let name = format!("mean of {}", scored.len());
+        let name = match summary.frames {
+            all if all == scored.len() as u64 => format!("mean of {all}"),
+            some => format!("mean of {some} of {}", scored.len()),
+        };
         add(&name, RowKind::Mean, &|metric| {
-            summary.value(metric).ok_or_else(|| reason(&summary.not_computed, metric))
+            summary.value(metric).ok_or_else(|| without(&summary.not_computed, metric))
         });
     }
     table
+}
+
+/// What is said where a metric has no value.
+fn without(missing: &BTreeMap<MetricId, String>, metric: MetricId) -> String {
+    format!("{} not computed: {}", metric.title(), reason(missing, metric))
 }
 
 /// Why a metric was not computed.
