@@ -7,7 +7,9 @@ use skinsplat::run::held_out::held_out;
 use skinsplat_core::scene::{Avatar, Binding, Camera, Image, Mask};
 use skinsplat_data::{FrameGenerator, FrameRef, FrameSource, Sequence, Subject, Truth};
 use skinsplat_fit::Error;
-use skinsplat_fit::texture::SAMPLES;
+use skinsplat_fit::options::PoseFit;
+use skinsplat_fit::pose_fit::{Posable, Target, fit_pose};
+use skinsplat_fit::texture::{SAMPLES, TextureInit, gather_texture};
 use skinsplat_fit::train::{Trainer, start};
 use skinsplat_fit::{FitOptions, RECIPES, Recipe};
 use skinsplat_render::mesh::SamplePattern;
@@ -98,7 +100,7 @@ fn an_interrupted_fit_ends_in_the_same_bits_on_any_number_of_threads() {
 #[test]
 fn gaussians_of_a_hybrid_stay_where_the_mesh_falls_short() {
     let training = small(&subject().train[0], 3);
-    let recipe = "haha+loss.opacity=0.01+start.inset=0.0+rates.position=1e-3+rates.scale=1e-2";
+    let recipe = "haha+loss.opacity=0.01+start.inset=0.0+rates.position=1e-3+rates.scale=1e-2+schedule.and_shape_visits=false";
     let options = options(recipe, 150);
     let first = start(&training, &options).unwrap().avatar;
     let survivors = |sequence: &Sequence| {
@@ -118,6 +120,50 @@ fn gaussians_of_a_hybrid_stay_where_the_mesh_falls_short() {
     });
     let (few, more) = (survivors(&shown_by_the_mesh), survivors(&training));
     assert!(few < more && 2 * more < first.gaussians.len(), "{few}, {more} of {}", first.gaussians.len());
+}
+
+/// HAHA's stages: Gaussians alone, texels alone, both.
+#[test]
+fn a_hybrid_is_fitted_in_three_stages() {
+    let training = small(&subject().train[0], 3);
+    let options = options("haha+mesh.gaussians_first=0.25+mesh.texture_next=0.25+mesh.texture=64", 12);
+    let first = start(&training, &options).unwrap().avatar;
+    let mut trainer = Trainer::new(&training, &options, first).unwrap();
+    let parts = |trainer: &Trainer<'_>| {
+        (trainer.avatar().clone(), trainer.fitted().mesh.unwrap().texture.image().clone())
+    };
+    let mut before = parts(&trainer);
+    for iteration in 0..12 {
+        trainer.step().unwrap();
+        let after = parts(&trainer);
+        let changed = (before.0 != after.0, before.1 != after.1);
+        let expected = match iteration {
+            0..3 => (true, false),
+            3..6 => (false, true),
+            _ => (true, true),
+        };
+        assert_eq!(changed, expected, "iteration {iteration}");
+        before = after;
+    }
+}
+
+/// A mesh alone is brought back to the pose in which it was seen.
+#[test]
+fn the_pose_of_a_textured_mesh_is_found_again() {
+    let training = small(&subject().train[0], 2);
+    let init = TextureInit { size: 128, ..TextureInit::default() };
+    let mesh = gather_texture(&training, &init).unwrap();
+    let (pose, camera) = (&training.poses[training.frames[1].pose], &training.cameras[0]);
+    let drawing = mesh.drawing(pose, camera, SamplePattern::new(SAMPLES)).unwrap();
+    let truth = Truth::new(drawing.colour, drawing.coverage);
+    let joint = |k: usize| glam::DVec3::new(0.0, 0.0, if k.is_multiple_of(2) { 0.05 } else { -0.05 });
+    let turns: Vec<glam::DVec3> = (0..pose.locals.len()).map(joint).collect();
+    let given = pose.turned(&turns, glam::DVec3::new(0.01, -0.01, 0.0));
+    let posable = Posable { body: &training.body, gaussians: None, mesh: Some(&mesh) };
+    let target = Target { truth: &truth, camera, background: [1.0; 3], antialiased: false };
+    let found = fit_pose(&posable, &target, &given, &PoseFit::default()).unwrap();
+    let [before, after] = found.losses;
+    assert!(after < 0.25 * before, "{before} {after}");
 }
 
 #[test]

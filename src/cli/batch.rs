@@ -55,11 +55,11 @@ struct Slurm {
     /// Processors per slice: as many threads compute
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..))]
     cpus: u16,
-    /// Memory per slice
-    #[arg(long, value_name = "SIZE", default_value = "4G")]
+    /// Memory per slice, as Slurm reads it: megabytes, or a number with K, M, G or T
+    #[arg(long, value_name = "SIZE", default_value = "4G", value_parser = memory)]
     mem: String,
-    /// Time limit per slice: one that reaches it is requeued and goes on
-    #[arg(long, value_name = "TIME", default_value = "04:00:00")]
+    /// Time limit per slice, as Slurm reads it (minutes, HH:MM:SS, DAYS-HH:MM): one that reaches it is requeued and goes on
+    #[arg(long, value_name = "TIME", default_value = "04:00:00", value_parser = time_limit)]
     time: String,
     /// Further options of sbatch, such as --partition=long (may be repeated)
     #[arg(long = "sbatch", value_name = "OPTION", allow_hyphen_values = true)]
@@ -81,6 +81,28 @@ Examples:
   reproduce batch slurm --shards 16 --out runs/all -- --profile standard > submit.sh
   reproduce batch slurm --shards 8 --sbatch=--partition=long -- table1 --data /data/mine | bash
   reproduce batch array --shards 4 --jobs 2 --out runs/table1 -- table1 | bash";
+
+/// Sizes that sbatch takes (its manual page, `--mem`), but none of nothing: 0 asks for the whole node there.
+fn memory(text: &str) -> Result<String, String> {
+    let number = text.strip_suffix(|c: char| "KMGTkmgt".contains(c)).unwrap_or(text);
+    match number.parse::<u32>() {
+        Ok(1..) if number.bytes().all(|b| b.is_ascii_digit()) => Ok(text.to_owned()),
+        _ => Err("expected megabytes, or a whole number with K, M, G or T, such as 4G".to_owned()),
+    }
+}
+
+/// Limits that sbatch takes (its manual page, `--time`): M, M:S, H:M:S, D-H, D-H:M, D-H:M:S.
+fn time_limit(text: &str) -> Result<String, String> {
+    let (days, clock) = text.split_once('-').map_or((None, text), |(days, clock)| (Some(days), clock));
+    let parts: Vec<&str> = days.into_iter().chain(clock.split(':')).collect();
+    let number = |part: &&str| (1..=6).contains(&part.len()) && part.bytes().all(|b| b.is_ascii_digit());
+    let most = if days.is_some() { 4 } else { 3 };
+    let some = parts.iter().any(|part| part.bytes().any(|b| b != b'0'));
+    match parts.len() <= most && parts.iter().all(number) && some {
+        true => Ok(text.to_owned()),
+        false => Err("expected minutes, HH:MM:SS or DAYS-HH:MM, above 0".to_owned()),
+    }
+}
 
 /// Ends the lines that a job gets; no quoted argument holds it as a line, since none holds a line break.
 const END: &str = "END_OF_JOB";
@@ -234,5 +256,26 @@ impl Run {
     /// The first option that makes no sense for all slices together, if one was given.
     fn unsliced(&self) -> Option<&'static str> {
         self.whole_run_options().into_iter().find_map(|(option, given)| given.then_some(option))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{memory, time_limit};
+
+    #[test]
+    fn limits_are_those_that_slurm_reads() {
+        for time in ["30", "30:00", "04:00:00", "2-12", "1-00:30", "1-02:03:04"] {
+            assert!(time_limit(time).is_ok(), "{time}");
+        }
+        for time in ["", "soon", "4h", "0", "00:00:00", "1:2:3:4", "1-", "-1", "1-2:3:4:5", "1 2"] {
+            assert!(time_limit(time).is_err(), "{time}");
+        }
+        for size in ["4G", "400M", "2048", "1T", "10k"] {
+            assert!(memory(size).is_ok(), "{size}");
+        }
+        for size in ["", "G", "0", "0G", "4GB", "-4G", "+4G", "1.5G", "lots"] {
+            assert!(memory(size).is_err(), "{size}");
+        }
     }
 }

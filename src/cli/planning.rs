@@ -27,6 +27,10 @@ pub(super) struct Planning {
     /// Most iterations of a fit [default: the profile's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     fit_iterations: Option<u32>,
+    /// Avatars that are made here start with edges of at most so many millimetres: more Gaussians where it is smaller [default:
+    /// the profile's]
+    #[arg(long, value_name = "MM", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    avatar_edge: Option<u32>,
     /// Repeat every fit with these seeds (such as 0,1,2), and print means and spreads
     #[arg(long, value_name = "S,…", value_delimiter = ',')]
     seeds: Vec<u64>,
@@ -131,7 +135,8 @@ impl Planning {
 
     fn profile(&self) -> Profile {
         let fit_iterations = self.fit_iterations.or(self.profile.fit_iterations);
-        Profile { fit_iterations, ..self.profile.clone() }
+        let avatar_edge_mm = self.avatar_edge.unwrap_or(self.profile.avatar_edge_mm);
+        Profile { fit_iterations, avatar_edge_mm, ..self.profile.clone() }
     }
 
     /// The experiments that the arguments name.

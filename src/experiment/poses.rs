@@ -51,7 +51,23 @@ impl Experiment {
     }
 }
 
-/// Checks noise, takes and how poses are fitted.
+/// That no column of fitted poses is there without the one as given, nor where nothing was fitted.
+fn check_columns(e: &Experiment, file: &str) -> Result<(), Error> {
+    let alone = |column: &&Column| {
+        let given = e.columns.iter().any(|other| other.metric == column.metric && !other.fitted);
+        column.fitted && (e.test_poses == TestPoses::AsGiven || !given)
+    };
+    match e.columns.iter().find(alone) {
+        None => Ok(()),
+        Some(column) => {
+            let problem = format!("`fitted` of {}", column.metric.id());
+            let expected = "test_poses = \"fitted\", which shows both scores of every metric";
+            Err(Error::invalid(file, "columns", problem, expected))
+        }
+    }
+}
+
+/// Checks noise, takes, how poses are fitted, and the columns that show it.
 pub(super) fn check(e: &Experiment, file: &str) -> Result<(), Error> {
     let noise = |key: String, degrees: Option<f64>| match degrees {
         Some(degrees) if !(0.0..=MOST_NOISE).contains(&degrees) => {
@@ -59,6 +75,7 @@ pub(super) fn check(e: &Experiment, file: &str) -> Result<(), Error> {
         }
         _ => Ok(()),
     };
+    check_columns(e, file)?;
     noise("pose_noise".to_owned(), e.pose_noise)?;
     for (i, variant) in e.variants.iter().enumerate() {
         noise(format!("variants[{i}].pose_noise"), variant.pose_noise)?;
@@ -81,9 +98,10 @@ pub(super) fn check(e: &Experiment, file: &str) -> Result<(), Error> {
         .map_err(|error| Error::invalid(file, "test_pose", error.to_string(), "numbers in range"))
 }
 
-/// Where test poses are fitted, every column of a metric of frames becomes two: as given, then fitted.
+/// Where test poses are fitted, every column of a metric of frames becomes two: as given, then fitted. An experiment that was
+/// written after that stays as it is.
 pub(super) fn expand(mut e: Experiment) -> Experiment {
-    if e.test_poses == TestPoses::AsGiven {
+    if e.test_poses == TestPoses::AsGiven || e.columns.iter().any(|column| column.fitted) {
         return e;
     }
     let both = |column: Column| {

@@ -34,7 +34,7 @@ impl Profile {
             max_test_frames: Some(6),
             resolution: Some(256),
             fit_iterations: Some(240),
-            avatar_edge_mm: 14,
+            avatar_edge_mm: 20,
         }
     }
 

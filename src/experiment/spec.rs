@@ -165,8 +165,9 @@ pub struct Column {
     /// Whether the experiment is about it, so that the best is bold: if absent, metrics of frames are, counts are not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outcome: Option<bool>,
-    /// It shows the score after the pose was fitted to the image; the column before it is the one as given.
-    #[serde(skip)]
+    /// It shows the score after the pose was fitted to the image; the column before it is the one as given. Not for files:
+    /// `test_poses = "fitted"` makes two columns of each.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub fitted: bool,
 }
 

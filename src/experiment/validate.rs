@@ -36,7 +36,10 @@ pub(super) fn experiment(e: &Experiment, file: &str) -> Result<(), Error> {
         let key = if e.columns.is_empty() { "columns" } else { "variants" };
         return fail(key, "none".into(), "at least one");
     }
-    distinct_in(file, "columns.metric", e.columns.iter().map(|c| c.metric.id()))?;
+    for fitted in [false, true] {
+        let shown = e.columns.iter().filter(|column| column.fitted == fitted);
+        distinct_in(file, "columns.metric", shown.map(|column| column.metric.id()))?;
+    }
     distinct_in(file, "variants.id", e.variants.iter().map(|v| v.id.as_str()))?;
     distinct_in(file, "variants.label", e.variants.iter().map(|v| v.label.as_str()))?;
     let average = e.average.iter().map(|average| average.label.as_str());

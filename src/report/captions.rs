@@ -136,6 +136,9 @@ fn profile(profile: &Profile, experiment: &Experiment) -> String {
     {
         bounds.push(format!("fits of at most {n} iterations"));
     }
+    if Profile::preset(&profile.id).is_some_and(|preset| preset.avatar_edge_mm != profile.avatar_edge_mm) {
+        bounds.push(format!("avatars made with edges of at most {} mm", profile.avatar_edge_mm));
+    }
     format!("Profile: {}, {}", profile.id, bounds.join(", "))
 }
 

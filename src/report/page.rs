@@ -1,8 +1,8 @@
 //! `tables.md`: every table of a run on one page.
 
 use super::captions::count;
-use super::{Results, markdown};
-use crate::experiment::{ADDED_VARIANT, AvatarRecipe, GIVEN_AVATAR, Options, Profile};
+use super::{Results, TableResults, markdown};
+use crate::experiment::{ADDED_VARIANT, AvatarRecipe, Experiment, GIVEN_AVATAR, Options, Profile};
 use std::collections::BTreeSet;
 
 /// The page: how it was made, what is missing, and the tables.
@@ -48,6 +48,16 @@ fn given_avatar(recipe: &AvatarRecipe) -> Option<String> {
     Some(format!("--avatar {}=FILE", name.strip_prefix(GIVEN_AVATAR)?))
 }
 
+/// The arguments that gave variants of built-in experiments their frames, where those have none of their own.
+fn given_renders(table: &TableResults) -> impl Iterator<Item = String> {
+    let known = Experiment::embedded_all().into_iter().find(|known| known.id == table.experiment);
+    let fitted: Vec<String> = known.into_iter().flat_map(|known| known.variants).map(|own| own.id).collect();
+    let variants = table.sequences.iter().flat_map(|sequence| &sequence.variants);
+    let rendered = variants.filter(|variant| matches!(variant.avatar, AvatarRecipe::Renders { .. }));
+    let given = rendered.filter(move |variant| fitted.contains(&variant.id));
+    given.map(|variant| format!("--renders {}=FOLDER", variant.id))
+}
+
 /// The command that makes these tables again, from the same data.
 pub(super) fn command(results: &Results) -> String {
     let Options { profile, subset, lpips_weights, seeds } = &results.options;
@@ -60,9 +70,14 @@ pub(super) fn command(results: &Results) -> String {
     }
     let given: BTreeSet<String> = variants.filter_map(|variant| given_avatar(&variant.avatar)).collect();
     words.extend(given);
-    let usual = Profile::preset(&profile.id).and_then(|preset| preset.fit_iterations);
+    words.extend(results.tables.iter().flat_map(given_renders).collect::<BTreeSet<_>>());
+    let preset = Profile::preset(&profile.id);
+    let usual = preset.as_ref().and_then(|preset| preset.fit_iterations);
     if let Some(iterations) = profile.fit_iterations.filter(|_| profile.fit_iterations != usual) {
         words.push(format!("--fit-iterations {iterations}"));
+    }
+    if preset.is_some_and(|preset| preset.avatar_edge_mm != profile.avatar_edge_mm) {
+        words.push(format!("--avatar-edge {}", profile.avatar_edge_mm));
     }
     if !seeds.is_empty() {
         words.push(format!("--seeds {}", seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(",")));

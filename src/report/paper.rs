@@ -2,7 +2,7 @@
 
 use super::build::{Notes, SAMPLE_UNIT};
 use super::layout::{Entry, digits, shape};
-use crate::experiment::{Experiment, Paper, PaperRow, Printed, Source};
+use crate::experiment::{Column, Experiment, Paper, PaperRow, Printed, Source};
 use skinsplat_table::{Cell, Content, Digits, RowKind, Table};
 
 /// The printed numbers that belong beside an entry, and the differences to them: on the table's own data only, and only
@@ -23,7 +23,7 @@ pub(super) fn beside(
         }
     };
     let Some(row) = row() else { return Vec::new() };
-    let printed = entry(experiment, row, &ours.sequence, &ours.variant, notes);
+    let printed = entry(&experiment.columns, row, [&ours.sequence, &ours.variant], notes);
     let differences =
         ours.cells.iter().zip(&printed.cells).zip(&experiment.columns).map(|((a, b), column)| {
             match (a.content, b.content) {
@@ -51,11 +51,17 @@ pub(super) fn printed_table(experiment: &Experiment, paper: &Paper) -> Table {
         (Some(average), true) => average.label.clone(),
         _ => row.sequence.clone(),
     };
+    // It prints one score of a frame; which poses that is of the caption says.
+    let plain = |column: &Column| Column { title: None, ..column.clone() };
+    let columns: Vec<Column> = match experiment.fitted_test_poses() {
+        None => experiment.columns.clone(),
+        Some(_) => experiment.columns.iter().filter(|column| !column.fitted).map(plain).collect(),
+    };
     let entries = paper.rows.iter().map(|row| {
         let label = paper.label(&row.variant).unwrap_or(&row.variant);
-        entry(experiment, row, &average(row), label, &mut notes)
+        entry(&columns, row, [&average(row), label], &mut notes)
     });
-    let shape = shape(experiment.layout, &experiment.columns, entries.collect());
+    let shape = shape(experiment.layout, &columns, entries.collect());
     Table {
         sentences: vec![paper.caption.clone(), "The paper's values, on its data and avatars".to_owned()],
         sample_unit: Some(SAMPLE_UNIT.to_owned()),
@@ -72,7 +78,7 @@ pub(super) fn printed_table(experiment: &Experiment, paper: &Paper) -> Table {
 }
 
 /// A printed row, its digits and its bold.
-fn entry(experiment: &Experiment, row: &PaperRow, sequence: &str, variant: &str, notes: &mut Notes) -> Entry {
+fn entry(columns: &[Column], row: &PaperRow, [sequence, variant]: [&str; 2], notes: &mut Notes) -> Entry {
     let doubt = row.doubt.as_ref().map(|doubt| notes.index(format!("{sequence}, {variant}: {doubt}")));
     let cell = |printed: &Printed, best: bool, doubtful: bool| Cell {
         text: printed.to_string(),
@@ -80,7 +86,7 @@ fn entry(experiment: &Experiment, row: &PaperRow, sequence: &str, variant: &str,
         notes: doubt.filter(|_| doubtful).into_iter().collect(),
         ..Cell::number(printed.value(), Digits::Decimals(printed.decimals()))
     };
-    let cells = experiment.columns.iter().map(|column| {
+    let cells = columns.iter().map(|column| {
         let doubtful = row.doubt.as_ref().is_some_and(|doubt| doubt.starts_with(column.metric.id()));
         let printed = row.value(column.metric).filter(|_| !column.fitted);
         printed.map_or_else(Cell::empty, |p| cell(p, row.bold.contains(&column.metric), doubtful))

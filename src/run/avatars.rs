@@ -8,7 +8,7 @@ use super::fitting::{self, FitEvent, FitFiles, Tests};
 use super::textured::TexturedFiles;
 use super::{Error, Event, Library};
 use crate::experiment::{AvatarSource, Plan, PlannedAvatar, PlannedFit, TrainingFrames};
-use skinsplat_data::{Sequence, ply};
+use skinsplat_data::{FrameRef, Sequence, ply};
 use skinsplat_fit::recipe::Poses;
 use skinsplat_fit::surface::{SurfaceInit, surface_init};
 use skinsplat_fit::texture::{TextureInit, gather_texture};
@@ -19,9 +19,40 @@ use std::path::Path;
 pub(super) struct Workshop<'a> {
     library: &'a Library,
     curves: CurveFrames<'a>,
+    training: TrainingHeld,
     /// The run's folder of avatars.
     folder: &'a Path,
     watch: &'a (dyn Fn(Event) + Sync),
+}
+
+/// The training frames of the avatar made last, decoded or drawn once for all avatars that are made from them: starts look at each
+/// again and again.
+#[derive(Default)]
+struct TrainingHeld(Option<(PlannedFrames, Sequence)>);
+
+/// Data set, subject and frames.
+type PlannedFrames = (String, String, TrainingFrames);
+
+impl TrainingHeld {
+    /// Frames are held if they take no more than this, bytes; larger sequences belong to fits that take long beside that.
+    const MOST_BYTES: usize = 128 << 20;
+
+    /// The sequence with its images in memory, if they are few and small enough.
+    fn of(&mut self, avatar: &PlannedAvatar, training: &Sequence) -> Result<Sequence, Error> {
+        let pixels = |frame: &FrameRef| {
+            let camera = &training.cameras[frame.camera];
+            camera.width as usize * camera.height as usize
+        };
+        let bytes = training.frames.iter().map(pixels).sum::<usize>() * size_of::<[f32; 4]>();
+        let Some(frames) = avatar.training().filter(|_| bytes <= Self::MOST_BYTES) else {
+            return Ok(training.clone());
+        };
+        let key = (avatar.dataset.clone(), avatar.subject.clone(), frames.clone());
+        match &self.0 {
+            Some((known, held)) if *known == key => Ok(held.clone()),
+            _ => Ok(self.0.insert((key, training.held()?)).1.clone()),
+        }
+    }
 }
 
 /// Points of the curve of test scores, after the start.
@@ -35,7 +66,7 @@ impl<'a> Workshop<'a> {
         folder: &'a Path,
         watch: &'a (dyn Fn(Event) + Sync),
     ) -> Self {
-        Self { library, curves: CurveFrames::new(plan), folder, watch }
+        Self { library, curves: CurveFrames::new(plan), training: TrainingHeld::default(), folder, watch }
     }
 
     /// Reads an avatar, from its own file or from the run's folder, where it is made if it is not there. Whether it was
@@ -73,7 +104,7 @@ impl<'a> Workshop<'a> {
     }
 
     fn surface(
-        &self,
+        &mut self,
         avatar: &PlannedAvatar,
         training: &Sequence,
         init: &SurfaceInit,
@@ -83,7 +114,7 @@ impl<'a> Workshop<'a> {
         entry.ensure(
             |damage| warn(self.watch, damage),
             || {
-                let made = surface_init(training, init)?;
+                let made = surface_init(&self.training.of(avatar, training)?, init)?;
                 let metadata = ply::Metadata::default();
                 Ok(ply::write_avatar(&file, &made, &metadata, ply::Encoding::LittleEndian)?)
             },
@@ -93,7 +124,7 @@ impl<'a> Workshop<'a> {
 
     /// A textured body: its texture, its dressed vertices beside it.
     fn textured(
-        &self,
+        &mut self,
         avatar: &PlannedAvatar,
         training: &Sequence,
         size: u32,
@@ -101,7 +132,7 @@ impl<'a> Workshop<'a> {
         let entry = Entry::new(self.folder, &avatar.key, &["npy", "vertices.npy"]);
         let files = TexturedFiles { texture: entry.path("npy"), vertices: entry.path("vertices.npy") };
         let init = TextureInit { size, ..TextureInit::default() };
-        let make = || files.write(&gather_texture(training, &init)?);
+        let make = || files.write(&gather_texture(&self.training.of(avatar, training)?, &init)?);
         entry.ensure(|damage| warn(self.watch, damage), make)?;
         Ok(Drawable::Textured(Cow::Owned(files.read(&training.body)?)))
     }
@@ -134,6 +165,7 @@ impl<'a> Workshop<'a> {
                 };
                 let tests: Vec<Sequence> = tests.iter().map(noisy).collect();
                 let name = format!("{}/{}/{}", avatar.dataset, avatar.subject, training.id);
+                let training = &self.training.of(avatar, training)?;
                 let fit = || fit_into(&files, planned, training, &name, &tests, watch);
                 // The name of a checkpoint here is that of its fit: one that does not belong to it is damaged or of another
                 // version of the program.

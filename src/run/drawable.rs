@@ -211,7 +211,7 @@ impl Drawable<'_> {
     /// counts as black, on both sides.
     ///
     /// # Errors
-    /// What no pose moves: frames of another program, a mesh without Gaussians. As [`fit_pose`].
+    /// Frames of another program, which no pose moves. As [`fit_pose`].
     pub(super) fn fit_pose(
         &self,
         view: &PosedView<'_>,
@@ -219,14 +219,16 @@ impl Drawable<'_> {
         look: &Look<'_>,
         options: &PoseFit,
     ) -> Result<FittedPose, Error> {
-        let (Bound { avatar, body }, mesh) = match self {
-            Self::Gaussians(bound) => (&**bound, None),
-            Self::Hybrid(bound, mesh) => (&**bound, Some(&**mesh)),
-            Self::Textured(_) | Self::Renders(_) => return Err(Error::NoPoseToFit),
+        let (bound, mesh) = match self {
+            Self::Gaussians(bound) => (Some(&**bound), None),
+            Self::Hybrid(bound, mesh) => (Some(&**bound), Some(&**mesh)),
+            Self::Textured(mesh) => (None, Some(&**mesh)),
+            Self::Renders(_) => return Err(Error::NoPoseToFit),
         };
-        let strategy = look.strategy.ok_or(Error::NoStrategy)?;
-        let body = body.as_deref().unwrap_or(view.body.rest);
-        let posable = Posable { bound: avatar, body, mesh, strategy: &strategy };
+        let strategy = bound.map(|_| look.strategy.ok_or(Error::NoStrategy)).transpose()?;
+        let body = bound.and_then(|bound| bound.body.as_deref()).unwrap_or(view.body.rest);
+        let gaussians = bound.map(|bound| &bound.avatar).zip(strategy.as_ref());
+        let posable = Posable { body, gaussians, mesh };
         let (background, antialiased) = (look.background.colour(), look.antialiased);
         let target = Target { truth, camera: view.camera, background, antialiased };
         Ok(fit_pose(&posable, &target, view.pose, options)?)

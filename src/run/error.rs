@@ -56,7 +56,7 @@ pub enum Error {
     #[error("strategy: missing; expected one, since the avatar has Gaussians to pose")]
     NoStrategy,
     /// A pose that is to be fitted where none is read.
-    #[error("fitted pose: the frame was not drawn from Gaussians; expected an avatar that a pose moves")]
+    #[error("fitted pose: the frame comes from another program; expected an avatar that a pose moves")]
     NoPoseToFit,
     /// Rotations that are to be compared where there are none.
     #[error("{of}")]

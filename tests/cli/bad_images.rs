@@ -1,6 +1,7 @@
 //! Images that are wrong.
 
 use crate::args;
+use crate::files::{Values, npz};
 use crate::program::Desk;
 use crate::support::{data, fixture};
 
@@ -104,12 +105,14 @@ fn what_a_file_is_instead_is_said() {
     desk.put("gzip.npz", b"\x1f\x8b\x08\0\0\0\0\0");
     desk.put("gzip.json", b"\x1f\x8b\x08\0\0\0\0\0");
     desk.put("wide.json", b"\xff\xfe{\0}\0");
+    npz(&desk.path("out.npz"), &[("../../poses", &[1], Values::F32(vec![0.0]))]);
     for (file, what) in [
         ("lfs.png", "git lfs pull"),
         ("lfs.ply", "git lfs pull"),
         ("gzip.npz", "compressed by gzip"),
         ("gzip.json", "compressed by gzip"),
         ("wide.json", "UTF-16 text"),
+        ("out.npz", "an entry named `../../poses.npy`"),
     ] {
         desk.run(args!["inspect", file]).refuses(&[file, what], what);
     }

@@ -30,6 +30,23 @@ fn names_that_start_with_a_dot_are_no_frames() {
 }
 
 #[test]
+fn pictures_of_other_kinds_beside_frames_are_said() {
+    let desk = Desk::new();
+    let (render, truth) = (case("background-255/render_on_white.png"), case("background-255/truth_rgba.png"));
+    for (folder, image) in [("mine", &render), ("true", &truth)] {
+        desk.put(&format!("{folder}/a.png"), std::fs::read(image).unwrap());
+    }
+    desk.put("mine/b.webp", "RIFF");
+    let answer = desk.run(args!["score", "mine", "true"]);
+    assert_eq!(answer.code, Some(0), "{answer:?}");
+    assert!(answer.err.contains("mine: b.webp is of a kind that is not read: passed over"), "{}", answer.err);
+    desk.put("none/c.webp", "RIFF");
+    desk.put("none/d.tiff", "II");
+    let refused = desk.run(args!["score", "none", "true"]);
+    refused.refuses(&["none: 2 pictures are of kinds that are not read (c.webp, …)", ".png"], "other kinds");
+}
+
+#[test]
 fn backgrounds_are_between_0_and_1() {
     let desk = Desk::new();
     let (render, truth) = (case("background-255/render_on_white.png"), case("background-255/truth_rgba.png"));

@@ -90,6 +90,25 @@ fn a_single_frame_counts_where_its_own_tolerance_says_so() {
 }
 
 /// What is missing is not worse, and what is left is compared over the frames that both have.
+/// With poses fitted to the test images a variant has two summaries, and both are looked at.
+#[test]
+fn scores_of_fitted_poses_are_compared_too() {
+    let fitted = |by: f64| {
+        let mut results = base();
+        let variant = &mut results.tables[0].sequences[0].variants[0];
+        let mut summary = variant.summary.clone().unwrap();
+        let psnr = summary.value(MetricId::PSNR).unwrap();
+        summary.values.insert(MetricId::PSNR, psnr + by);
+        variant.fitted = Some(summary);
+        results
+    };
+    let changes = compare(&fitted(1.0), &fitted(0.5), &Tolerances::default());
+    assert_eq!((changes.verdict, changes.counts.regressed), (Verdict::Regressed, 1));
+    assert!(text(&changes, false).contains("PSNR (fitted)"), "{}", text(&changes, false));
+    let lost = compare(&fitted(1.0), &base(), &Tolerances::default());
+    assert!(lost.counts.missing > 0 && !lost.is_good(), "{:?}", lost.counts);
+}
+
 #[test]
 fn lost_scores_are_missing_and_new_ones_are_no_matter() {
     let (full, holes) = (base(), results(&table_7(), with_holes));
@@ -171,7 +190,8 @@ fn other_circumstances_are_said() {
     assert_eq!(
         notes,
         [
-            "profile: standard, 2000 iterations in the baseline, standard, 128 pixels, 2000 iterations now"
+            "profile: standard, 2000 iterations, edges of 10 mm in the baseline, standard, 128 pixels, 2000 iterations, edges of 10 mm \
+             now"
                 .to_owned(),
             format!("code version of render: {render} in the baseline, {} now", render + 1)
         ]

@@ -155,7 +155,10 @@ fn the_tables_ask_what_the_paper_asks() {
     let (mono, multi, hands) = (Capture::Monocular, Capture::Multiview, Capture::Hands);
     assert_eq!(captures, [mono, mono, mono, multi, mono, hands]);
     for experiment in &experiments {
-        let metrics: Vec<&str> = experiment.columns.iter().map(|column| column.metric.id()).collect();
+        let given = experiment.columns.iter().filter(|column| !column.fitted);
+        let metrics: Vec<&str> = given.map(|column| column.metric.id()).collect();
+        let fitted = experiment.columns.iter().filter(|column| column.fitted).count();
+        assert_eq!(fitted, if experiment.id == "table6" { 3 } else { 0 }, "{}", experiment.id);
         let splats = if experiment.id == "table3" { &["splats"][..] } else { &[] };
         assert_eq!(metrics, [&["psnr", "ssim", "lpips"], splats].concat(), "{}", experiment.id);
         assert_eq!(experiment.layout == Layout::Wide, experiment.id == "table6");

@@ -18,6 +18,16 @@ pub fn files(folder: &Path, field: &str, extensions: &[&str]) -> Result<Vec<Path
     Ok(visible(folder, field, &wanted)?.into_iter().filter(fits).collect())
 }
 
+/// Names of pictures in a folder that are of kinds which nothing here reads, in the order of their numbers.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn unread_pictures(folder: &Path) -> Result<Vec<String>, Error> {
+    let kinds =
+        ["webp", "bmp", "gif", "tif", "tiff", "exr", "hdr", "avif", "heic", "jxl", "jp2", "ppm", "tga"];
+    Ok(files(folder, "frames", &kinds)?.iter().map(|path| file_name(path)).collect())
+}
+
 /// The folders in a folder, in the order of their numbers.
 ///
 /// # Errors

@@ -2,10 +2,10 @@
 
 use super::npy::{self, Array, Header};
 use super::shapes::Extents;
-use super::{Error, source};
+use super::{Error, listing, source};
 use skinsplat_core::scene::SceneError;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
@@ -25,15 +25,34 @@ impl std::fmt::Debug for Archive {
     }
 }
 
+/// That no name in an archive leads out of it: whoever unpacks such a one writes where its author likes.
+///
+/// # Errors
+/// Names the first that does.
+pub(crate) fn check_names<R: Read + Seek>(
+    path: &Path,
+    what: &str,
+    archive: &ZipArchive<R>,
+) -> Result<(), Error> {
+    match archive.file_names().flatten().find(|name| !listing::stays_inside(name, 0)) {
+        None => Ok(()),
+        Some(name) => {
+            let expected = "an archive whose names stay inside it";
+            Err(Error::invalid(path, what, format!("an entry named `{name}`"), expected))
+        }
+    }
+}
+
 impl Archive {
     /// Opens an archive and reads its directory. `what` says what the file is for ("body", "poses").
     ///
     /// # Errors
-    /// A file that cannot be read or is no zip archive.
+    /// A file that cannot be read or is no zip archive; names that lead out of it.
     pub fn open(path: &Path, what: &str) -> Result<Self, Error> {
         let open = || ZipArchive::new(BufReader::new(source::open(path)?));
         let inner =
             open().map_err(|cause| Error::read(path, what, "a .npz archive of arrays", cause.into()))?;
+        check_names(path, what, &inner)?;
         Ok(Self { path: path.to_owned(), inner, extents: Extents::default() })
     }
 

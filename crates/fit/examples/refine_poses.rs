@@ -75,7 +75,7 @@ fn scores(
             let squares = pairs.map(|(a, b)| f64::from((a.min(1.0) - b) * (a.min(1.0) - b))).sum::<f64>();
             Ok(-10.0 * portable::log10(squares / (3 * image.pixels().len()) as f64))
         };
-        let posable = Posable { bound, body: &tests.body, mesh: None, strategy };
+        let posable = Posable { body: &tests.body, gaussians: Some((bound, strategy)), mesh: None };
         let target = Target { truth: &truth, camera, background: [1.0; 3], antialiased: false };
         let fitted = fit_pose(&posable, &target, given, &PoseFit::default())?.pose;
         sums[0] += psnr(given)?;

@@ -155,6 +155,10 @@ pub struct Schedule {
     /// No more iterations of the fit of the shape: beyond, outlines gain a ten-thousandth of their overlap and what lies
     /// between them drifts.
     pub most_shape_iterations: u32,
+    /// As many iterations more as that first stage would look at frames: for a recipe without it that is compared with one that has
+    /// it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub and_shape_visits: bool,
     /// Of the moments of the Gaussians' parameters; the ε is that of 3DGS.
     pub moments: Moments,
 }
@@ -165,6 +169,7 @@ impl Default for Schedule {
             between_bindings: 50,
             shape_share: 0.25,
             most_shape_iterations: 400,
+            and_shape_visits: false,
             moments: Moments::with_epsilon(1e-15),
         }
     }

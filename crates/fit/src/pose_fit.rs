@@ -8,8 +8,8 @@ use crate::texture::{SAMPLES, TexturedBody};
 use crate::train::composite;
 use skinsplat_core::math::portable;
 use skinsplat_core::scene::{
-    BodyGradient, Camera, Gaussians, Image, Pose, PosedBody, PosedGradient, Rendered, RenderedGradient,
-    RestBody, SceneError,
+    BodyGradient, Camera, Gaussians, Image, Pose, Posed, PosedBody, PosedGradient, Rendered,
+    RenderedGradient, RestBody, SceneError,
 };
 use skinsplat_data::sequence::Truth;
 use skinsplat_posing::{BoundAvatar, Gradients, PoseOptions, Poser, Strategy};
@@ -20,14 +20,12 @@ use skinsplat_render::splat::{Derivatives, Renderer};
 /// What is drawn while its pose is fitted.
 #[derive(Clone, Copy, Debug)]
 pub struct Posable<'a> {
-    /// The Gaussians.
-    pub bound: &'a BoundAvatar,
-    /// The body that they hang on.
+    /// The body that is posed.
     pub body: &'a RestBody,
-    /// The mesh that is drawn with them, which asks nothing of the pose.
+    /// The Gaussians that hang on it, and how they are posed.
+    pub gaussians: Option<(&'a BoundAvatar, &'a Strategy)>,
+    /// The mesh that is drawn, with or without them.
     pub mesh: Option<&'a TexturedBody>,
-    /// How Gaussians are posed.
-    pub strategy: &'a Strategy,
 }
 
 /// The image that a pose is fitted to.
@@ -135,13 +133,16 @@ impl Scratch {
         options: &PoseFit,
     ) -> Result<(f64, skinsplat_core::scene::PoseGradient), SceneError> {
         let Self { poser, renderer, losses, over, of_rendered, of_posed, of_body } = self;
-        let Posable { bound, body, mesh, strategy } = *posable;
+        let Posable { body, gaussians, mesh } = *posable;
         let body = PosedBody::new(body, pose)?;
         let posing = PoseOptions::default();
         let in_posing = |error: skinsplat_posing::PosingError| {
             SceneError::new("pose", error.to_string(), "an avatar that can be posed")
         };
-        let posed = poser.pose(bound, &body, strategy, &posing).map_err(in_posing)?;
+        let posed = match gaussians {
+            Some((bound, strategy)) => poser.pose(bound, &body, strategy, &posing).map_err(in_posing)?,
+            None => Posed::NOTHING,
+        };
         let drawing =
             mesh.map(|mesh| mesh.drawing(pose, target.camera, SamplePattern::new(SAMPLES))).transpose()?;
         let underlay = drawing.as_ref().map(Drawing::underlay);
@@ -152,10 +153,17 @@ impl Scratch {
         let loss = losses.frame((image, alpha), (over, &target.truth.alpha), &weights, of_rendered);
         renderer.backward(&posed, &view, of_rendered, of_posed, Derivatives::Exact)?;
         of_body.reset(body.joints.len());
-        let into = Gradients { body: Some(&mut *of_body), ..Gradients::default() };
-        poser
-            .backward(bound, &body, strategy, &posing, &Gaussians::default(), of_posed, into)
-            .map_err(in_posing)?;
-        Ok((loss.total, body.pose_gradient(pose, of_body)?))
+        if let Some((bound, strategy)) = gaussians {
+            let into = Gradients { body: Some(&mut *of_body), ..Gradients::default() };
+            poser
+                .backward(bound, &body, strategy, &posing, &Gaussians::default(), of_posed, into)
+                .map_err(in_posing)?;
+        }
+        let mut gradient = body.pose_gradient(pose, of_body)?;
+        if let (Some(mesh), Some(drawing), Some(shown)) = (mesh, &drawing, renderer.underlay_weight()) {
+            let seen = (pose, target.camera);
+            gradient += mesh.pose_gradient(seen, drawing, target.background, of_rendered, shown)?;
+        }
+        Ok((loss.total, gradient))
     }
 }

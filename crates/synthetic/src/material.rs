@@ -8,6 +8,7 @@ use super::skeleton::{ARM_Y, ARM_Z};
 use glam::{Vec2, Vec3};
 use skinsplat_core::math::portable;
 use std::f32::consts::TAU;
+use std::sync::LazyLock;
 
 /// Colours and patterns of a subject.
 #[derive(Clone, Debug)]
@@ -20,8 +21,11 @@ pub(super) struct Material {
     hair: Vec3,
 }
 
-const WHITE: [f32; 3] = [0.93, 0.92, 0.90];
-const DARK: [f32; 3] = [0.09, 0.09, 0.10];
+// Asked for at every sample, and a power each to make.
+static WHITE: LazyLock<Vec3> = LazyLock::new(|| to_linear([0.93, 0.92, 0.90]));
+static DARK: LazyLock<Vec3> = LazyLock::new(|| to_linear([0.09, 0.09, 0.10]));
+static BUCKLE: LazyLock<Vec3> = LazyLock::new(|| to_linear([0.78, 0.70, 0.45]));
+static LEATHER: LazyLock<Vec3> = LazyLock::new(|| to_linear([0.25, 0.15, 0.09]));
 
 impl Material {
     pub(super) fn new(look: Look, seed: u32) -> Self {
@@ -31,11 +35,7 @@ impl Material {
         Self {
             look,
             seed,
-            shirt: [
-                to_linear(hsv(hue, 0.72, 0.80)),
-                to_linear(WHITE),
-                to_linear(hsv(hue + 35.0, 0.85, 0.35)),
-            ],
+            shirt: [to_linear(hsv(hue, 0.72, 0.80)), *WHITE, to_linear(hsv(hue + 35.0, 0.85, 0.35))],
             trousers: [to_linear(hsv(trousers, 0.55, 0.42)), to_linear(hsv(trousers, 0.30, 0.72))],
             skin: between([0.36, 0.22, 0.16], [0.94, 0.76, 0.66], look.skin),
             hair: between([0.07, 0.05, 0.05], [0.80, 0.62, 0.38], look.hair),
@@ -57,7 +57,7 @@ impl Material {
             y if y > 0.965 => self.torso(p),
             y if y > 0.935 => self.belt(p),
             y if y > 0.118 => self.trouser_leg(p),
-            y if y > 0.105 && p.z < 0.05 => self.cloth(to_linear(WHITE), p, 0.8),
+            y if y > 0.105 && p.z < 0.05 => self.cloth(*WHITE, p, 0.8),
             _ => self.shoe(p),
         }
     }
@@ -71,7 +71,7 @@ impl Material {
         let lattice = Vec2::new(along * 6.0 / self.look.pattern_scale as f32, around / TAU * repeats);
         let mut colour = self.pattern(lattice, [base, self.shirt[1], self.shirt[2]]);
         if (along - bone - 0.5).abs() > 0.485 {
-            colour = to_linear(DARK);
+            colour = *DARK;
         }
         if (around / TAU).abs() < 0.02 {
             colour = self.shirt[2];
@@ -165,9 +165,9 @@ impl Material {
         let spokes = (portable::atan2(at.y, at.x) * 6.0 / TAU).rem_euclid(1.0) < 0.5;
         match radius {
             r if r > 1.0 => cloth,
-            r if r > 0.86 => self.contrasted(to_linear(DARK), cloth),
-            r if r > 0.45 => self.contrasted(if spokes { self.shirt[2] } else { to_linear(WHITE) }, cloth),
-            r if r > 0.36 => self.contrasted(to_linear(DARK), cloth),
+            r if r > 0.86 => self.contrasted(*DARK, cloth),
+            r if r > 0.45 => self.contrasted(if spokes { self.shirt[2] } else { *WHITE }, cloth),
+            r if r > 0.36 => self.contrasted(*DARK, cloth),
             _ => self.contrasted(self.trousers[1], cloth),
         }
     }
@@ -180,7 +180,7 @@ impl Material {
             && (chevron * 2.2).rem_euclid(1.0) < 0.42
             && chevron.abs() < 0.9
         {
-            let ink = if at.x > 0.0 { self.shirt[2] } else { to_linear(DARK) };
+            let ink = if at.x > 0.0 { self.shirt[2] } else { *DARK };
             return self.contrasted(ink, cloth);
         }
         cloth
@@ -196,16 +196,16 @@ impl Material {
         let mut colour = self.pattern(Vec2::new(out * self.rate(), around * repeats), self.shirt);
         // A line along the outside shows twists.
         if (around - 0.25).abs() < 0.035 {
-            colour = self.contrasted(to_linear(DARK), colour);
+            colour = self.contrasted(*DARK, colour);
         }
         self.cloth(colour, p, 0.62)
     }
 
     fn belt(&self, p: Vec3) -> Finish {
         if p.z > 0.0 && p.x.abs() < 0.028 {
-            return self.finish(to_linear([0.78, 0.70, 0.45]), p, 60.0, 0.28);
+            return self.finish(*BUCKLE, p, 60.0, 0.28);
         }
-        self.finish(to_linear([0.25, 0.15, 0.09]), p, 60.0, 0.38)
+        self.finish(*LEATHER, p, 60.0, 0.38)
     }
 
     fn trouser_leg(&self, p: Vec3) -> Finish {
@@ -215,7 +215,7 @@ impl Material {
         let knee = Vec2::new(around / 0.11, (p.y - 0.50) / 0.06).abs().max_element() < 1.0;
         let fine = (p.y * 110.0).floor() + (around * 64.0).floor();
         let colour = match () {
-            () if (around - 0.25).abs() < 0.022 => to_linear(WHITE),
+            () if (around - 0.25).abs() < 0.022 => *WHITE,
             () if (around - 0.25).abs() < 0.045 => self.shirt[0],
             () if knee => {
                 if fine.rem_euclid(2.0) < 0.5 {
@@ -234,8 +234,8 @@ impl Material {
     fn shoe(&self, p: Vec3) -> Finish {
         let lace = p.y > 0.055 && (0.0..0.075).contains(&p.z) && (p.x.abs() - 0.108).abs() < 0.022;
         let colour = match () {
-            () if p.y < 0.022 => to_linear(WHITE),
-            () if lace && (p.z * 75.0).rem_euclid(1.0) < 0.45 => to_linear(WHITE),
+            () if p.y < 0.022 => *WHITE,
+            () if lace && (p.z * 75.0).rem_euclid(1.0) < 0.45 => *WHITE,
             () if p.z > 0.095 => self.trousers[0],
             () => self.shirt[0] * 0.55,
         };
@@ -245,7 +245,7 @@ impl Material {
     fn hand(&self, p: Vec3) -> Finish {
         // A strap around the wrist and darker creases at the knuckles.
         if p.x.abs() < 0.685 {
-            return self.finish(to_linear(DARK), p, 200.0, 0.35);
+            return self.finish(*DARK, p, 200.0, 0.35);
         }
         let crease = 1.0 - 0.12 * self.contrast() * f32::from((p.x.abs() * 55.0).rem_euclid(1.0) < 0.12);
         self.finish(self.skin * crease, p, 130.0, 0.42)

@@ -96,6 +96,11 @@ impl Score {
         if let Some(guess) = pairs.iter().find_map(|pair| pair.guessed()).filter(|_| folders) {
             context.note(format!("masks paired by their numbers: {guess}"));
         }
+        for folder in [Some(&self.render), Some(&self.truth), self.mask.as_ref()].into_iter().flatten() {
+            if let Some(found) = folders.then(|| pairs::passed_over(folder)).transpose()?.flatten() {
+                context.note(format!("{found}: passed over"));
+            }
+        }
         if self.protocol.as_deref() == Some(all::ID) {
             all::run(self, &pairs, context)?;
             return Ok(Exit::Success);

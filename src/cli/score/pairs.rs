@@ -140,9 +140,21 @@ fn frames_of(folder: &Path) -> Result<Frames> {
         }
     }
     if frames.is_empty() {
-        bail!("{}: no frames; expected .png, .jpg or .npy images", folder.display());
+        let found = passed_over(folder)?.unwrap_or_else(|| format!("{}: no frames", folder.display()));
+        bail!("{found}; expected .png, .jpg or .npy images");
     }
     Ok(frames)
+}
+
+/// What a folder holds besides its frames: pictures of kinds that are not read.
+pub(super) fn passed_over(folder: &Path) -> Result<Option<String>> {
+    let names = listing::unread_pictures(folder)?;
+    let Some(first) = names.first() else { return Ok(None) };
+    let which = match names.len() {
+        1 => format!("{first} is of a kind that is not read"),
+        n => format!("{n} pictures are of kinds that are not read ({first}, …)"),
+    };
+    Ok(Some(format!("{}: {which}", folder.display())))
 }
 
 /// The masks of a folder by the names of the truths: their own, or, where no name is one of a truth, the truth with the same last

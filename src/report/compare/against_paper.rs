@@ -81,6 +81,7 @@ fn line(
         sequence,
         variant,
         metric: Some(metric),
+        fitted: false,
         baseline: Some(paper),
         current,
         tolerance: Some(tolerance),

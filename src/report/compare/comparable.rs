@@ -169,5 +169,5 @@ fn profile(results: &Results) -> String {
     let profile = &results.options.profile;
     let bound = |bound: Option<u32>, what: &str| bound.map_or_else(String::new, |n| format!(", {n} {what}"));
     let (side, fits) = (bound(profile.resolution, "pixels"), bound(profile.fit_iterations, "iterations"));
-    format!("{}{side}{fits}", profile.id)
+    format!("{}{side}{fits}, edges of {} mm", profile.id, profile.avatar_edge_mm)
 }

@@ -50,7 +50,7 @@ fn message(changes: &Changes, line: &Line) -> String {
     };
     let shown =
         |value: Option<f64>| value.map_or_else(|| "nothing".to_owned(), |value| finer(metric).show(value));
-    let numbers = format!("{} {} -> {}", metric.title(), shown(line.baseline), shown(line.current));
+    let numbers = format!("{} {} -> {}", line.title(), shown(line.baseline), shown(line.current));
     let tolerance = line.tolerance.map_or_else(String::new, |t| format!(" (tolerance {t})"));
     format!("{at}: {numbers}{tolerance}{}", frames(changes, line, metric))
 }

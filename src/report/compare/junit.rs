@@ -40,6 +40,7 @@ pub fn junit(changes: &Changes) -> String {
 
 fn case(changes: &Changes, line: &Line) -> TestCase {
     let metric = line.metric.map_or("all", MetricId::id);
+    let metric = if line.fitted { format!("{metric} fitted") } else { metric.to_owned() };
     let frames =
         if line.frames.is_empty() { String::new() } else { format!(" [{}]", line.frames.join(", ")) };
     let name = format!("{} {} {metric}{frames}", line.sequence, line.variant);

@@ -115,6 +115,9 @@ pub struct Line {
     /// The metric; none where all of them are missing or new.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metric: Option<MetricId>,
+    /// With every test pose fitted to its image.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub fitted: bool,
     /// In the baseline; infinite is `null` in JSON.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<f64>,
@@ -129,6 +132,14 @@ pub struct Line {
     /// Frames of which that is said, where it is not said of the whole sequence.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frames: Vec<String>,
+}
+
+impl Line {
+    /// What its number is called.
+    pub(super) fn title(&self) -> String {
+        let metric = self.metric.map_or("all", MetricId::title);
+        if self.fitted { format!("{metric} (fitted)") } else { metric.to_owned() }
+    }
 }
 
 /// A number of a frame that moved.

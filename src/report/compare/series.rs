@@ -27,6 +27,7 @@ impl<'a> Series<'a> {
             sequence: self.sequence.id.clone(),
             variant: self.variant.id.clone(),
             metric: None,
+            fitted: false,
             baseline: None,
             current: None,
             tolerance: None,
@@ -75,17 +76,22 @@ impl Pair<'_> {
                 series.over(&shared.iter().filter_map(|name| frames.get(name).copied()).collect::<Vec<_>>())
             }
         };
-        self.numbers(of(&before, &self.before), of(&after, &self.after), tolerances, changes);
+        let summaries = [of(&before, &self.before), of(&after, &self.after)];
+        self.numbers(summaries, false, tolerances, changes);
+        if whole {
+            let fitted = [&self.before, &self.after].map(|series| series.variant.fitted.clone());
+            self.numbers(fitted, true, tolerances, changes);
+        }
         for name in shared {
             self.frame(before[name], after[name], tolerances, changes);
         }
     }
 
-    /// The aggregates.
+    /// The aggregates, of poses as they are given or `fitted`.
     fn numbers(
         &self,
-        before: Option<Summary>,
-        after: Option<Summary>,
+        [before, after]: [Option<Summary>; 2],
+        fitted: bool,
         tolerances: &Tolerances,
         changes: &mut Changes,
     ) {
@@ -100,7 +106,8 @@ impl Pair<'_> {
                 (None, None) => continue,
             };
             let (metric, tolerance) = (Some(metric), Some(tolerance));
-            changes.lines.push(Line { metric, baseline, current, tolerance, ..self.before.line(fate) });
+            let line = Line { metric, fitted, baseline, current, tolerance, ..self.before.line(fate) };
+            changes.lines.push(line);
         }
     }
 

@@ -34,8 +34,8 @@ pub fn verdicts(changes: &Changes, wanted: impl Fn(Fate) -> bool) -> Table {
 }
 
 fn verdict(index: usize, line: &Line) -> Row {
-    let metric = line.metric.map_or("all", MetricId::title);
-    let labels = [line.table.as_str(), &line.sequence, &line.variant, metric];
+    let metric = line.title();
+    let labels = [line.table.as_str(), &line.sequence, &line.variant, &metric];
     let number = |value: Option<f64>| match (line.metric, value) {
         (Some(metric), Some(value)) => Cell::number(value, finer(metric)),
         _ => Cell::empty(),

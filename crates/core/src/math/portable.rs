@@ -54,16 +54,24 @@ pub fn exp<T: Real>(x: T) -> T {
 /// [`exp`] of `f32`, which fits take of every scale and opacity in every step: the series in f64, without a branch.
 #[inline]
 pub(super) fn exp_of_f32(x: f32) -> f32 {
+    exp_series(f64::from(x)) as f32
+}
+
+/// e to the power of `x`, for results that are rounded to `f32`.
+#[inline]
+fn exp_series(x: f64) -> f64 {
     // What lies beyond is 0 or infinite in f32.
-    let x = f64::from(x).clamp(-160.0, 160.0);
-    let halvings = (x * std::f64::consts::LOG2_E).round_ties_even();
+    let x = x.clamp(-160.0, 160.0);
+    // To the nearest integer, ties to even, by adding what has no digits below one: without SSE 4.1 rounding is a call.
+    const NO_DIGITS: f64 = 6_755_399_441_055_744.0;
+    let halvings = (x * std::f64::consts::LOG2_E + NO_DIGITS) - NO_DIGITS;
     let rest = x - halvings * std::f64::consts::LN_2;
     let mut series = EXP_SERIES[0];
     for coefficient in &EXP_SERIES[1..] {
         series = series * rest + coefficient;
     }
     let power = f64::from_bits(((halvings as i64 + 1023) as u64) << 52);
-    (series * power) as f32
+    series * power
 }
 
 /// 1/n! from n = 12 to 0: with |x| up to half the logarithm of 2 the next term is below 2e-16.
@@ -99,7 +107,33 @@ pub fn hypot<T: Real>(x: T, y: T) -> T {
 /// `x` to the power of `y`.
 #[inline]
 pub fn pow<T: Real>(x: T, y: T) -> T {
-    T::from_f64(libm::pow(x.to_f64(), y.to_f64()))
+    x.pow(y)
+}
+
+/// [`pow`] of `f32`, which generated images take of every sample: two series in f64.
+#[inline]
+pub(super) fn pow_of_f32(x: f32, y: f32) -> f32 {
+    if !(x >= f32::MIN_POSITIVE && x.is_finite() && y.is_finite()) {
+        return libm::pow(f64::from(x), f64::from(y)) as f32;
+    }
+    exp_series(f64::from(y) * ln_series(f64::from(x))) as f32
+}
+
+/// Natural logarithm of a normal number above 0, for results that are rounded to `f32`: with s = (m - 1) / (m + 1),
+/// ln m = 2 (s + s^3/3 + s^5/5 + …).
+#[inline]
+fn ln_series(x: f64) -> f64 {
+    let bits = x.to_bits();
+    // x = m 2^e with m within a factor of the square root of 2 of 1.
+    let e = (bits.wrapping_sub(std::f64::consts::FRAC_1_SQRT_2.to_bits()) as i64) >> 52;
+    let m = f64::from_bits(bits.wrapping_sub((e as u64) << 52));
+    let s = (m - 1.0) / (m + 1.0);
+    let square = s * s;
+    let mut series = 1.0 / 21.0;
+    for k in (0..10).rev() {
+        series = series * square + 1.0 / f64::from(2 * k + 1);
+    }
+    2.0 * s * series + e as f64 * std::f64::consts::LN_2
 }
 
 /// `x` to an integer power, by repeated squaring in the precision of `x`; negative powers are reciprocals.
@@ -214,7 +248,15 @@ mod tests {
             // of two correct roundings of one number, one may be next to the other
             let (single, system) = (exp(x as f32), (x as f32).exp());
             assert!(single.to_bits().abs_diff(system.to_bits()) <= 1);
+            for y in [1.0 / 2.4, 2.4, -3.7] {
+                let (single, system) = (pow(x as f32, y), (x as f32).powf(y));
+                assert!(single.to_bits().abs_diff(system.to_bits()) <= 1, "{x} {y}");
+            }
         }
+        for (x, y) in [(0.0, 2.0), (f32::INFINITY, 0.5), (-8.0, 3.0), (1e-42, 0.5), (2.0, f32::INFINITY)] {
+            assert_eq!(pow(x, y), x.powf(y));
+        }
+        assert!(pow(-1.0f32, 0.5).is_nan() && pow(3e38f32, 4.0).is_infinite() && pow(3e38f32, -4.0) == 0.0);
     }
 
     #[test]

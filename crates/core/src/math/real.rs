@@ -60,6 +60,8 @@ pub trait Real:
     fn copysign(self, sign: Self) -> Self;
     /// e to the power of `self`, of the same bits everywhere.
     fn exp(self) -> Self;
+    /// `self` to the power of `y`, of the same bits everywhere.
+    fn pow(self, y: Self) -> Self;
     /// Four-quadrant angle of the point (x = `x`, y = `self`), radians.
     fn atan2(self, x: Self) -> Self;
     /// Neither infinite nor NaN.
@@ -71,7 +73,7 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($type:ident, $triple:ty, $exp:path) => {
+    ($type:ident, $triple:ty, $exp:path, $pow:path) => {
         impl Real for $type {
             type Triple = $triple;
             const ZERO: Self = 0.0;
@@ -104,6 +106,10 @@ macro_rules! real {
                 $exp(self)
             }
             #[inline(always)]
+            fn pow(self, y: Self) -> Self {
+                $pow(self, y)
+            }
+            #[inline(always)]
             fn atan2(self, x: Self) -> Self {
                 super::portable::atan2(self, x)
             }
@@ -123,5 +129,5 @@ macro_rules! real {
     };
 }
 
-real!(f32, glam::Vec3A, super::portable::exp_of_f32);
-real!(f64, glam::DVec3, libm::exp);
+real!(f32, glam::Vec3A, super::portable::exp_of_f32, super::portable::pow_of_f32);
+real!(f64, glam::DVec3, libm::exp, libm::pow);

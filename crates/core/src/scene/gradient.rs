@@ -128,6 +128,16 @@ pub struct PoseGradient {
     pub translation: DVec3,
 }
 
+impl std::ops::AddAssign for PoseGradient {
+    /// # Panics
+    /// If the two are of other numbers of nodes.
+    fn add_assign(&mut self, other: Self) {
+        assert_eq!(self.rotations.len(), other.rotations.len(), "one derivative per node");
+        self.rotations.iter_mut().zip(other.rotations).for_each(|(own, other)| *own += other);
+        self.translation += other.translation;
+    }
+}
+
 fn refill<T: Clone>(values: &mut Vec<T>, count: usize, zero: T) {
     values.clear();
     values.resize(count, zero);

@@ -40,6 +40,18 @@ pub struct Posed<'a> {
 }
 
 impl Posed<'_> {
+    /// No Gaussians.
+    pub const NOTHING: Posed<'static> = Posed {
+        means: &[],
+        factors: &[],
+        opacities: &[],
+        sh_degree: 0,
+        sh: &[],
+        view_frames: None,
+        colour_clamp: ColourClamp::NonNegative,
+        rotations: None,
+    };
+
     /// Number of Gaussians.
     #[inline]
     pub fn len(&self) -> usize {

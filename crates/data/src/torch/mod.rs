@@ -8,7 +8,7 @@ mod element;
 
 use super::npy::Array;
 use super::pickle::{Field, Pickle, TensorPlace};
-use super::{Error, npy, source};
+use super::{Error, npy, npz, source};
 use element::Element;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -53,6 +53,7 @@ impl Checkpoint {
         let expected = "a torch file (an archive with data.pkl)";
         let open = || ZipArchive::new(BufReader::new(source::open(path)?));
         let mut archive = open().map_err(|cause| Error::read(path, what, expected, cause.into()))?;
+        npz::check_names(path, what, &archive)?;
         let described = |name: std::borrow::Cow<'_, str>| name.strip_suffix("data.pkl").map(str::to_owned);
         let root = archive.file_names().flatten().find_map(described);
         let root = root.filter(|root| root.is_empty() || root.ends_with('/'));

@@ -94,8 +94,7 @@ impl FitOptions {
     /// Iterations of the first stage, where there is one: a share of the fit's, but no more than help. Its steps look at
     /// several frames each.
     pub fn shape_iterations(&self) -> u32 {
-        let Schedule { shape_share, most_shape_iterations, .. } = self.recipe.schedule;
-        ((f64::from(self.iterations) * shape_share) as u32).clamp(1, most_shape_iterations.max(1))
+        self.recipe.shape_iterations(self.iterations)
     }
 }
 
@@ -107,7 +106,7 @@ pub enum Poses {
     #[default]
     Given,
     /// They are fitted with the avatar ([`PoseRefinement`]), as HUGS, HAHA and InstantAvatar do. The avatar's start is made with
-    /// those given, and the mesh of a hybrid asks nothing of them.
+    /// those given.
     Refine,
 }
 
@@ -274,6 +273,24 @@ pub struct MeshLayer {
     /// Of Adam's steps on the texels.
     #[serde(default = "defaults::texel_moments")]
     pub moments: Moments,
+    /// Share of the iterations in which Gaussians are fitted without the mesh: HAHA's first stage.
+    #[serde(default)]
+    pub gaussians_first: f32,
+    /// Share of the iterations after that in which the texture is fitted without Gaussians, in poses that stay as they are:
+    /// its second stage. In the rest both are drawn and fitted together.
+    #[serde(default)]
+    pub texture_next: f32,
+}
+
+/// What is drawn and fitted in an iteration of a hybrid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Gaussians alone, as in every fit without a mesh.
+    Gaussians,
+    /// The textured mesh alone.
+    Texture,
+    /// Both.
+    Together,
 }
 
 /// How Gaussians come and go: adaptive density control of 3DGS, on a body.
@@ -347,14 +364,24 @@ impl Recipe {
     }
 
     /// Number of iterations of a fit to so many training images: `iterations`, but no more than a profile allows; without such a
-    /// bound, the method's own number.
+    /// bound, the method's own number. `schedule.and_shape_visits` comes on top.
     pub fn length(&self, images: usize, most: Option<u32>) -> u32 {
         let images = u32::try_from(images).unwrap_or(u32::MAX);
-        match (most, self.epochs) {
+        let length = match (most, self.epochs) {
             (Some(most), _) => self.iterations.min(most),
             (None, 0) => self.iterations,
             (None, epochs) => epochs.saturating_mul(images).max(1),
+        };
+        if !self.schedule.and_shape_visits {
+            return length;
         }
+        let frames = u32::try_from(self.shape.batch).unwrap_or(u32::MAX);
+        length.saturating_add(self.shape_iterations(length).saturating_mul(frames))
+    }
+
+    fn shape_iterations(&self, iterations: u32) -> u32 {
+        let Schedule { shape_share, most_shape_iterations, .. } = self.schedule;
+        ((f64::from(iterations) * shape_share) as u32).clamp(1, most_shape_iterations.max(1))
     }
 
     /// The SH degree in force at an iteration out of a number.
@@ -362,6 +389,25 @@ impl Recipe {
         let full = usize::from(self.sh_degree);
         let step = (f64::from(self.sh_step) * f64::from(iterations)).round() as u32;
         iteration.checked_div(step).map_or(full, |raised| full.min(raised as usize))
+    }
+
+    /// What is drawn and fitted at an iteration out of a number.
+    pub fn stage_at(&self, iteration: u32, iterations: u32) -> Stage {
+        let Some(MeshLayer { gaussians_first, texture_next, .. }) = self.mesh else {
+            return Stage::Gaussians;
+        };
+        let before = |share: f32| iteration < (f64::from(share) * f64::from(iterations)).round() as u32;
+        match () {
+            () if before(gaussians_first) => Stage::Gaussians,
+            () if before(gaussians_first + texture_next) => Stage::Texture,
+            () => Stage::Together,
+        }
+    }
+
+    /// What is minimised in a stage: Gaussians without a mesh beside them are not asked to be transparent.
+    pub(crate) fn loss_in(&self, stage: Stage) -> LossTerms {
+        let alone = self.mesh.is_some() && stage == Stage::Gaussians;
+        LossTerms { opacity: if alone { 0.0 } else { self.loss.opacity }, ..self.loss.clone() }
     }
 
     /// The recipe without its names: what a fit depends on.
@@ -417,6 +463,14 @@ impl Recipe {
         if !start.inset.is_finite() {
             return refuse("start.inset", start.inset.to_string(), "a finite number of pixels");
         }
+        if start.surface == Surface::Silhouettes && start.bind_to == BindTo::Faces {
+            let expected = "outlines: a surface fitted to the silhouettes has other faces than the body";
+            return refuse(
+                "start.surface",
+                "silhouettes, with Gaussians bound to faces".to_owned(),
+                expected,
+            );
+        }
         if self.sh_degree > 3 {
             return refuse("sh_degree", self.sh_degree.to_string(), "0 to 3");
         }
@@ -435,6 +489,15 @@ impl Recipe {
             }
             if !(mesh.rate.is_finite() && mesh.rate >= 0.0) {
                 return refuse("mesh.rate", mesh.rate.to_string(), "a finite number, at least 0");
+            }
+            let shares = [mesh.gaussians_first, mesh.texture_next];
+            if shares.iter().any(|share| !(0.0..=1.0).contains(share)) || shares.iter().sum::<f32>() > 1.0 {
+                let value = format!("{} and {}", shares[0], shares[1]);
+                return refuse(
+                    "mesh.gaussians_first and mesh.texture_next",
+                    value,
+                    "shares that add up to at most 1",
+                );
             }
             mesh.moments.check("mesh.moments")?;
         }

@@ -33,13 +33,14 @@ impl Density {
 
     /// Takes note of an iteration.
     pub(super) fn observe(&mut self, gradient: &PosedGradient) {
-        let seen = gradient.screen.iter().zip(&gradient.radii);
-        for ((sum, count), (slope, &radius)) in self.sums.iter_mut().zip(&mut self.counts).zip(seen) {
+        let seen = gradient.screen.par_iter().zip(&gradient.radii);
+        let known = self.sums.par_iter_mut().zip(&mut self.counts);
+        known.zip(seen).with_min_len(4096).for_each(|((sum, count), (slope, &radius))| {
             if radius > 0.0 {
                 *sum += portable::hypot(slope[0], slope[1]);
                 *count += 1;
             }
-        }
+        });
     }
 
     fn mean(&self, i: usize) -> f32 {

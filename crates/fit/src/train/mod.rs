@@ -23,7 +23,7 @@ use super::shape::{Ended, ShapeFit, fit_shape};
 use super::surface::{SurfaceInit, surface_init};
 use super::texture::TexturedBody;
 use crate::options::Clothing;
-use crate::recipe::{FitBackground, FitOptions, Poses, Recipe, Surface};
+use crate::recipe::{FitBackground, FitOptions, Poses, Recipe, Stage, Surface};
 use density::Density;
 use frames::TrainingFrames;
 use layer::Layer;
@@ -33,12 +33,12 @@ use serde::{Deserialize, Serialize};
 use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::scene::{
-    Avatar, AvatarGradient, Binding, BodyGradient, Image, Mask, PosedBody, PosedGradient, Rendered,
+    Avatar, AvatarGradient, Binding, BodyGradient, Image, Mask, Posed, PosedBody, PosedGradient, Rendered,
     RenderedGradient, RestBody,
 };
 use skinsplat_data::sequence::Sequence;
 use skinsplat_posing::nearest::NearestFace;
-use skinsplat_posing::{BoundAvatar, Gradients, PoseOptions, Poser, Strategy};
+use skinsplat_posing::{BoundAvatar, Gradients, PoseOptions, Poser, PosingError, Strategy};
 use skinsplat_render::View;
 use skinsplat_render::mesh::Drawing;
 use skinsplat_render::splat::{Derivatives, Renderer};
@@ -334,24 +334,25 @@ impl<'a> Trainer<'a> {
     pub fn step(&mut self) -> Result<Step, Error> {
         let (recipe, iterations) = (&self.options.recipe, self.options.iterations);
         self.parameters.raise_sh_degree(recipe.sh_degree_at(self.iteration, iterations));
-        let in_strategy = Error::strategy(self.sequence);
-        if self.is_resting() {
-            let avatar = &self.parameters.avatar;
-            self.bound.rebind(avatar, &self.sequence.body, self.faces.as_ref()).map_err(&in_strategy)?;
-        } else {
-            self.bound.update(&self.parameters.avatar).map_err(&in_strategy)?;
-        }
+        let (in_strategy, in_scene) = (Error::strategy(self.sequence), Error::scene(self.sequence));
+        self.bind().map_err(&in_strategy)?;
         let frame = self.frames.of_iteration(self.iteration as usize, &mut self.warnings)?;
         let refined = self.poses.as_ref().map(|poses| poses.applied(frame.pose_index, frame.pose));
         let pose = refined.as_ref().unwrap_or(frame.pose);
-        let body = PosedBody::new(&self.sequence.body, pose).map_err(Error::scene(self.sequence))?;
+        let body = PosedBody::new(&self.sequence.body, pose).map_err(&in_scene)?;
         let (strategy, posing) = (&self.strategy, PoseOptions::default());
         let Scratch { poser, renderer, truth, losses, of_rendered, of_posed, of_avatar, of_body } =
             &mut self.scratch;
-        let posed = poser.pose(&self.bound, &body, strategy, &posing).map_err(&in_strategy)?;
+        let stage = recipe.stage_at(self.iteration, iterations);
+        let posed = match stage {
+            Stage::Texture => Posed::NOTHING,
+            Stage::Gaussians | Stage::Together => {
+                poser.pose(&self.bound, &body, strategy, &posing).map_err(&in_strategy)?
+            }
+        };
         let background = background(recipe.background, self.options.seed, self.iteration);
-        let in_scene = Error::scene(self.sequence);
-        let drawing = self.layer.as_ref().map(|layer| layer.draw(pose, frame.camera));
+        let mesh = self.layer.as_mut().filter(|_| stage != Stage::Gaussians);
+        let drawing = mesh.as_ref().map(|mesh| mesh.draw(pose, frame.camera));
         let drawing = drawing.transpose().map_err(&in_scene)?;
         let underlay = drawing.as_ref().map(Drawing::underlay);
         let view = View::new(frame.camera).over(background).with_underlay(underlay);
@@ -360,45 +361,70 @@ impl<'a> Trainer<'a> {
         let weights = Weights { ssim: recipe.loss.ssim, silhouette: recipe.loss.silhouette };
         let loss = losses.frame((image, alpha), (truth, &frame.truth.alpha), &weights, of_rendered);
         renderer.backward(&posed, &view, of_rendered, of_posed, Derivatives::Exact).map_err(&in_scene)?;
-        if let (Some(layer), Some(shown)) = (&mut self.layer, renderer.underlay_weight()) {
-            layer.step(pose, frame.camera, &of_rendered.image, shown).map_err(&in_scene)?;
+        let pose_rates = poses::rates(&recipe.pose, self.iteration, iterations);
+        let free = self.poses.as_mut().zip(pose_rates).filter(|_| stage != Stage::Texture);
+        let mut of_mesh = None;
+        if let (Some(mesh), Some(drawing), Some(shown)) = (mesh, &drawing, renderer.underlay_weight()) {
+            if free.is_some() {
+                let seen = (pose, frame.camera);
+                let gradient = mesh.textured.pose_gradient(seen, drawing, background, of_rendered, shown);
+                of_mesh = Some(gradient.map_err(&in_scene)?);
+            }
+            mesh.step(pose, frame.camera, &of_rendered.image, shown).map_err(&in_scene)?;
+        }
+        let frame_name = frame.name.to_owned();
+        if stage == Stage::Texture {
+            return self.finish(loss, &frame_name, stage);
         }
         let Avatar { gaussians, binding } = &self.parameters.avatar;
         of_avatar.reset(gaussians, matches!(binding, Binding::Face(_)));
-        let pose_rates = poses::rates(&recipe.pose, self.iteration, iterations);
-        let free = self.poses.as_mut().zip(pose_rates);
         of_body.reset(body.joints.len());
         let into = Gradients { avatar: Some(of_avatar), body: free.is_some().then_some(&mut *of_body) };
         poser
             .backward(&self.bound, &body, strategy, &posing, gaussians, of_posed, into)
             .map_err(&in_strategy)?;
-        let frame_name = frame.name.to_owned();
         if let Some((poses, rates)) = free {
-            let gradient = body.pose_gradient(pose, of_body).map_err(&in_scene)?;
-            let skeleton = &self.sequence.body.skeleton;
-            let stopped = poses.step(frame.pose_index, skeleton, &gradient, (&recipe.pose, rates));
+            let mut gradient = body.pose_gradient(pose, of_body).map_err(&in_scene)?;
+            if let Some(of_mesh) = of_mesh {
+                gradient += of_mesh;
+            }
+            let Sequence { id, body, .. } = self.sequence;
+            let stopped = poses.step(frame.pose_index, &body.skeleton, &gradient, (&recipe.pose, rates));
             self.warnings.extend(stopped.map(|problem| {
-                let sequence = &self.sequence.id;
-                format!("{sequence}: the pose of frame {frame_name} is fitted no further: {problem}; kept as it was")
+                format!(
+                    "{id}: the pose of frame {frame_name} is fitted no further: {problem}; kept as it was"
+                )
             }));
         }
-        self.finish(loss, &frame_name)
+        self.finish(loss, &frame_name, stage)
+    }
+
+    /// Follows the avatar's parameters: now and then it is bound anew.
+    fn bind(&mut self) -> Result<(), PosingError> {
+        let avatar = &self.parameters.avatar;
+        match self.is_resting() {
+            true => self.bound.rebind(avatar, &self.sequence.body, self.faces.as_ref()),
+            false => self.bound.update(avatar),
+        }
     }
 
     /// The second half of an iteration: regularisers, the step, Gaussians that come and go.
-    fn finish(&mut self, loss: FrameLoss, frame: &str) -> Result<Step, Error> {
+    fn finish(&mut self, loss: FrameLoss, frame: &str, stage: Stage) -> Result<Step, Error> {
         let (recipe, iterations) = (&self.options.recipe, self.options.iterations);
-        let Parameters { avatar, start, .. } = &self.parameters;
-        let penalty = regularise::add(&recipe.loss, avatar, start, &mut self.scratch.of_avatar);
-        let total = loss.total + penalty;
-        let rates = RatesNow::of(recipe, self.iteration, iterations);
-        self.density.observe(&self.scratch.of_posed);
-        self.parameters.step(&mut self.scratch.of_avatar, &recipe.free, &rates);
+        let mut total = loss.total;
+        if stage != Stage::Texture {
+            let Parameters { avatar, start, .. } = &self.parameters;
+            total += regularise::add(&recipe.loss_in(stage), avatar, start, &mut self.scratch.of_avatar);
+            let rates = RatesNow::of(recipe, self.iteration, iterations);
+            self.density.observe(&self.scratch.of_posed);
+            self.parameters.step(&mut self.scratch.of_avatar, &recipe.free, &rates);
+        }
         if !total.is_finite() || self.parameters.broken().is_some() {
             return Err(self.diverged(frame));
         }
         self.iteration += 1;
-        if let Some(settings) = &recipe.densify
+        if stage != Stage::Texture
+            && let Some(settings) = &recipe.densify
             && density::is_due(settings, self.iteration, iterations)
         {
             let (body, faces) = (&self.sequence.body, self.faces.as_ref());

@@ -4,6 +4,7 @@ use crate::adam::Adam;
 use crate::options::Moments;
 use crate::recipe::{Free, FreePosition, FreeRotation, FreeScale, Recipe};
 use glam::{Quat, Vec3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use skinsplat_core::math::portable;
 use skinsplat_core::math::sh;
@@ -272,7 +273,11 @@ fn widened(values: &[[f32; 3]], from: usize, to: usize) -> Vec<[f32; 3]> {
 }
 
 fn broken(gaussians: &Gaussians) -> Option<(&'static str, usize)> {
+    const PART: usize = 1 << 14;
     let find = |name: &'static str, values: &[f32], width: usize| {
+        if values.par_chunks(PART).all(|part| part.iter().all(|v| v.is_finite())) {
+            return None;
+        }
         values.iter().position(|v| !v.is_finite()).map(|place| (name, place / width))
     };
     find("position", bytemuck::cast_slice(&gaussians.means), 3)

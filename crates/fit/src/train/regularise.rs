@@ -17,27 +17,28 @@ pub(super) fn add(
     let n = avatar.gaussians.len() as f32;
     let mut total = 0.0;
     if terms.long_thin > 0.0 || terms.scale > 0.0 {
-        for (log_scale, out) in avatar.gaussians.log_scales.iter().zip(&mut gradient.log_scales) {
+        let weight = terms.scale / (3.0 * n);
+        total += in_parts(&avatar.gaussians.log_scales, &mut gradient.log_scales, |log_scale, out| {
             let scale = log_scale.map(portable::exp);
             let square = scale * scale;
-            let weight = terms.scale / (3.0 * n);
-            total += f64::from(weight * square.element_sum());
             *out += 2.0 * weight * square;
-            if terms.long_thin_form == LongThin::Excess {
-                total += f64::from(excess(terms, scale, terms.long_thin / n, out));
-            }
-        }
+            let long = match terms.long_thin_form {
+                LongThin::Excess => excess(terms, scale, terms.long_thin / n, out),
+                LongThin::SplattingAvatar => 0.0,
+            };
+            f64::from(weight * square.element_sum()) + f64::from(long)
+        });
     }
     if terms.long_thin > 0.0 && terms.long_thin_form == LongThin::SplattingAvatar {
         total += needles(terms, avatar, gradient);
     }
     if terms.opacity > 0.0 {
         let weight = terms.opacity / n;
-        for (logit, out) in avatar.gaussians.opacity_logits.iter().zip(&mut gradient.opacity_logits) {
+        total += in_parts(&avatar.gaussians.opacity_logits, &mut gradient.opacity_logits, |logit, out| {
             let opacity = 1.0 / (1.0 + portable::exp(-logit));
-            total += f64::from(weight * opacity * opacity);
             *out += 2.0 * weight * opacity * opacity * (1.0 - opacity);
-        }
+            f64::from(weight * opacity * opacity)
+        });
     }
     if terms.sh_rest > 0.0 {
         total += sh_rest(terms.sh_rest / n, avatar, gradient);
@@ -46,6 +47,21 @@ pub(super) fn add(
         total += displacement(terms.displacement / n, avatar, origins, gradient);
     }
     total
+}
+
+/// Rows of parameters per unit of parallel work: fixed, so that sums do not depend on the number of threads.
+const PART: usize = 4096;
+
+/// The sum of a term over the Gaussians, which adds its derivatives on the way.
+fn in_parts<P: Sync, D: Send>(
+    parameters: &[P],
+    gradient: &mut [D],
+    term: impl Fn(&P, &mut D) -> f64 + Sync,
+) -> f64 {
+    let parts = parameters.par_chunks(PART).zip(gradient.par_chunks_mut(PART));
+    let sums: Vec<f64> =
+        parts.map(|(own, out)| own.iter().zip(out).map(|(own, out)| term(own, out)).sum()).collect();
+    sums.iter().sum()
 }
 
 /// `weight` times `max(a/b - ratio, 0) + max(a - limit, 0)` for the largest standard deviation a and the second b.
@@ -89,10 +105,8 @@ fn needles(terms: &LossTerms, avatar: &Avatar, gradient: &mut AvatarGradient) ->
     found.iter().map(|&(_, longest, _)| f64::from(weight * longest)).sum()
 }
 
-/// `weight` times the sum of the squared SH coefficients beyond degree 0. In parts of fixed size, so that the sum does not
-/// depend on the number of threads.
+/// `weight` times the sum of the squared SH coefficients beyond degree 0.
 fn sh_rest(weight: f32, avatar: &Avatar, gradient: &mut AvatarGradient) -> f64 {
-    const PART: usize = 4096;
     let count = avatar.gaussians.sh_count();
     let parts = avatar.gaussians.sh.par_chunks(PART * count).zip(gradient.sh.par_chunks_mut(PART * count));
     let sums: Vec<f64> = parts

@@ -1,7 +1,8 @@
-//! The way back from a drawn mesh to its texture.
+//! The way back from a drawn mesh to its texture and to its vertices.
 
 use super::texture::{Bilinear, coordinates};
 use super::{Mesh, PixelSamples, SamplePattern, raster};
+use glam::DVec3;
 use skinsplat_core::scene::{Camera, Image, SceneError, Uv};
 
 /// The derivatives of a loss with respect to the texels of a mesh's texture, from those with respect to the straight
@@ -42,6 +43,49 @@ pub fn texture_gradient(
         }
     }
     Ok(())
+}
+
+/// The derivatives of a loss with respect to the vertices of a mesh, from those with respect to where the point of the surface
+/// that a pixel shows is seen, pixels per axis, row by row from the top. Summed onto `gradient`, one per vertex. Which face is in
+/// front has none; a pixel's covered samples share its derivative.
+///
+/// # Errors
+/// As [`super::draw`].
+///
+/// # Panics
+/// If there is not one derivative per pixel of the camera, or not one gradient per vertex.
+pub fn motion_gradient(
+    mesh: &Mesh<'_>,
+    camera: &Camera,
+    pattern: SamplePattern,
+    of_places: &[[f32; 2]],
+    gradient: &mut [DVec3],
+) -> Result<(), SceneError> {
+    let scene = raster::Scene::new(mesh, camera, pattern)?;
+    assert_eq!(of_places.len(), camera.width as usize * camera.height as usize, "one derivative per pixel");
+    assert_eq!(gradient.len(), mesh.vertices.len(), "one gradient per vertex");
+    let seen = scene.resolve(|pixel| pixel.fragments().collect::<Vec<_>>());
+    for (fragments, of_place) in seen.iter().zip(of_places) {
+        if *of_place == [0.0; 2] {
+            continue;
+        }
+        for fragment in fragments {
+            let of_point = of_world(camera, fragment.position.as_dvec3(), of_place.map(f64::from));
+            let share = of_point / fragments.len() as f64;
+            for (corner, weight) in mesh.faces[fragment.face as usize].iter().zip(fragment.barycentric) {
+                gradient[*corner as usize] += share * f64::from(weight);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// From derivatives with respect to where a point is seen, pixels, to those with respect to the point, metres.
+fn of_world(camera: &Camera, point: DVec3, [of_x, of_y]: [f64; 2]) -> DVec3 {
+    let seen = camera.camera_from_world.transform_point3(point);
+    let (of_x, of_y) = (camera.fx * of_x / seen.z, camera.fy * of_y / seen.z);
+    let of_seen = DVec3::new(of_x, of_y, -(of_x * seen.x + of_y * seen.y) / seen.z);
+    camera.camera_from_world.transpose().transform_vector3(of_seen)
 }
 
 #[cfg(test)]
@@ -96,5 +140,48 @@ mod tests {
             }
         }
         assert!(seen > 20, "{seen}");
+    }
+
+    #[test]
+    fn vertices_have_the_derivatives_of_where_points_are_seen() {
+        let turn = DMat4::from_rotation_y(0.4) * DMat4::from_translation(glam::DVec3::new(0.1, -0.05, 0.3));
+        let camera =
+            Camera { width: 12, height: 10, fx: 9.0, fy: 11.0, cx: 6.0, cy: 5.0, camera_from_world: turn };
+        let vertices = [Vec3::new(-0.6, -0.5, 1.0), Vec3::new(0.7, -0.4, 1.4), Vec3::new(0.1, 0.6, 0.9)];
+        let faces = [[0, 1, 2]];
+        let pattern = SamplePattern::new(3);
+        let upstream: Vec<[f32; 2]> =
+            (0..120).map(|i| [((i * 7) % 5) as f32 - 2.0, ((i * 3) % 7) as f32 - 3.0]).collect();
+        // Where the points that pixels show are seen after the vertices have moved.
+        let mesh = Mesh::new(&vertices, &faces).unwrap();
+        let scene = raster::Scene::new(&mesh, &camera, pattern).unwrap();
+        let seen = scene.resolve(|pixel| pixel.fragments().collect::<Vec<_>>());
+        let loss = |vertices: &[DVec3; 3]| -> f64 {
+            let mut sum = 0.0;
+            for (fragments, of_place) in seen.iter().zip(&upstream) {
+                for fragment in fragments {
+                    let point: DVec3 = (0..3).map(|k| vertices[k] * f64::from(fragment.barycentric[k])).sum();
+                    let (place, _) = camera.project(point).unwrap();
+                    let weighted = place.x * f64::from(of_place[0]) + place.y * f64::from(of_place[1]);
+                    sum += weighted / fragments.len() as f64;
+                }
+            }
+            sum
+        };
+        let mut gradient = vec![DVec3::ZERO; 3];
+        motion_gradient(&mesh, &camera, pattern, &upstream, &mut gradient).unwrap();
+        let own = vertices.map(Vec3::as_dvec3);
+        for vertex in 0..3 {
+            for axis in 0..3 {
+                let at = |step: f64| {
+                    let mut moved = own;
+                    moved[vertex][axis] += step;
+                    loss(&moved)
+                };
+                let expected = (at(1e-5) - at(-1e-5)) / 2e-5;
+                let found = gradient[vertex][axis];
+                assert!((found - expected).abs() < 1e-4 * expected.abs().max(1.0), "{found} {expected}");
+            }
+        }
     }
 }

@@ -14,7 +14,7 @@ mod raster;
 mod setup;
 mod texture;
 
-pub use adjoint::texture_gradient;
+pub use adjoint::{motion_gradient, texture_gradient};
 pub use pattern::SamplePattern;
 pub use setup::NEAR_PLANE;
 pub use texture::Texture;
