@@ -1,6 +1,6 @@
 //! `reproduce compare`: a run against an earlier one, or against the paper.
 
-use super::output::{emit, save, written};
+use super::output::{apart, emit, save, written};
 use super::page::PICTURES;
 use super::selection::name_and_path;
 use super::tolerances::ToleranceOptions;
@@ -104,6 +104,8 @@ fn saving() -> impl TypedValueParser<Value = Saving> {
 
 impl Compare {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        let targets = self.save.iter().map(|saving| saving.file.as_path());
+        targets.into_iter().try_for_each(|file| apart(file, self.runs.iter().map(PathBuf::as_path)))?;
         let changes = match (&self.runs[..], self.against_paper) {
             ([run], true) => compare::against_paper(&self.chosen(load(run)?)?),
             ([baseline, current], false) => {

@@ -1,7 +1,7 @@
 //! Standard output and error: written in one place, so that a closed pipe (`| head`) neither ends the program nor changes how
 //! it ends: what was found out counts, whoever reads it.
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use skinsplat_data::atomic;
 use skinsplat_table::{FORMATS, Format as TableFormat, Table, to_json};
@@ -22,6 +22,22 @@ pub(super) fn emit(text: &str) -> Result<()> {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         written => written.context("standard output: cannot write"),
     }
+}
+
+/// The files of a run's folder that later calls read.
+const OF_A_RUN: [&str; 4] = ["results.json", "frames.jsonl", "run.json", "costs.json"];
+
+/// Refuses to write over what a command reads: files, or the files of runs' folders.
+///
+/// # Errors
+/// Names the target.
+pub(super) fn apart<'a>(target: &Path, read: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+    let Ok(own) = target.canonicalize() else { return Ok(()) };
+    let is = |path: &Path| path.canonicalize().is_ok_and(|path| path == own);
+    if read.into_iter().any(|path| is(path) || OF_A_RUN.iter().any(|name| is(&path.join(name)))) {
+        bail!("{}: it is read; expected another file to write", target.display());
+    }
+    Ok(())
 }
 
 /// Writes text to a file that the arguments name; one that is a pipe whose reader went away is no error.

@@ -133,6 +133,11 @@ impl Planning {
         Ok(experiments)
     }
 
+    /// The experiments that are files.
+    pub(super) fn files(&self) -> impl Iterator<Item = &Path> + Clone {
+        self.experiments.iter().map(Path::new).filter(|path| path.is_file())
+    }
+
     fn profile(&self) -> Profile {
         let fit_iterations = self.fit_iterations.or(self.profile.fit_iterations);
         let avatar_edge_mm = self.avatar_edge.unwrap_or(self.profile.avatar_edge_mm);

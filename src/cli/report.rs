@@ -1,7 +1,7 @@
 //! `reproduce report`: the tables of a run again, or against a baseline.
 
 use super::compare::{Comparing, check_tables, folder, load, only};
-use super::output::{emit, save, written};
+use super::output::{apart, emit, save, written};
 use super::page::{Images, page, write_page};
 use super::products::{MARKDOWN, printed};
 use super::selection::read_json;
@@ -55,6 +55,7 @@ Examples:
 impl Report {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let tables: Vec<String> = self.table.iter().cloned().collect();
+        self.out.iter().try_for_each(|path| apart(path, [self.run.as_path()]))?;
         let results = load(&self.run)?;
         if let Some(baseline) = &self.baseline {
             let format = self.format("text");

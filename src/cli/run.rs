@@ -1,6 +1,6 @@
 //! `reproduce run`: the main job.
 
-use super::output::{emit, written};
+use super::output::{apart, emit, written};
 use super::page::{Images, PICTURES, page, write_page};
 use super::planning::{Planned, Planning};
 use super::products::{
@@ -116,6 +116,8 @@ impl Run {
 
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let start = Instant::now();
+        let read = self.planning.files().chain([self.out.as_path()]);
+        self.html.iter().try_for_each(|path| apart(path, read.clone()))?;
         // The folder itself is made once there is a plan.
         self.html
             .iter()

@@ -111,6 +111,11 @@ impl Paper {
     pub fn label(&self, variant: &str) -> Option<&str> {
         self.variants.iter().find(|v| v.id == variant).map(|v| v.label.as_str())
     }
+
+    /// Whether the numbers of a variant are of fitted test poses, as far as the paper says.
+    pub fn fitted(&self, variant: &str) -> bool {
+        self.variants.iter().any(|v| v.id == variant && v.fitted == Some(true))
+    }
 }
 
 /// A variant of the printed table.
@@ -121,6 +126,9 @@ pub struct PaperVariant {
     pub id: String,
     /// As printed.
     pub label: String,
+    /// Whether its numbers are of test poses that were fitted to the images; absent where the paper does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<bool>,
 }
 
 /// The printed numbers of one sequence and variant. A key of the file that is no field is the name of a metric.

@@ -77,6 +77,14 @@ pub struct Seconds {
     pub render: f64,
     /// Scoring.
     pub score: f64,
+    /// Fitting the pose to the image, and the score after that, where it was asked for.
+    #[serde(default, skip_serializing_if = "nothing")]
+    pub fit: f64,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn nothing(seconds: &f64) -> bool {
+    *seconds == 0.0
 }
 
 /// Records by key: what a run or a report knows.

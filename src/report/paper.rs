@@ -23,7 +23,10 @@ pub(super) fn beside(
         }
     };
     let Some(row) = row() else { return Vec::new() };
-    let printed = entry(&experiment.columns, row, [&ours.sequence, &ours.variant], notes);
+    let of_paper = experiment.paper.as_ref().is_some_and(|paper| paper.fitted(&row.variant));
+    let fitted = of_paper && experiment.fitted_test_poses().is_some();
+    let stands = |column: &Column| column.fitted == fitted;
+    let printed = entry(&experiment.columns, row, [&ours.sequence, &ours.variant], &stands, notes);
     let differences =
         ours.cells.iter().zip(&printed.cells).zip(&experiment.columns).map(|((a, b), column)| {
             match (a.content, b.content) {
@@ -59,7 +62,7 @@ pub(super) fn printed_table(experiment: &Experiment, paper: &Paper) -> Table {
     };
     let entries = paper.rows.iter().map(|row| {
         let label = paper.label(&row.variant).unwrap_or(&row.variant);
-        entry(&columns, row, [&average(row), label], &mut notes)
+        entry(&columns, row, [&average(row), label], &|_| true, &mut notes)
     });
     let shape = shape(experiment.layout, &columns, entries.collect());
     Table {
@@ -77,8 +80,14 @@ pub(super) fn printed_table(experiment: &Experiment, paper: &Paper) -> Table {
     }
 }
 
-/// A printed row, its digits and its bold.
-fn entry(columns: &[Column], row: &PaperRow, [sequence, variant]: [&str; 2], notes: &mut Notes) -> Entry {
+/// A printed row, its digits and its bold, in the columns where it `stands`: a paper prints one score, of poses as given or fitted.
+fn entry(
+    columns: &[Column],
+    row: &PaperRow,
+    [sequence, variant]: [&str; 2],
+    stands: &dyn Fn(&Column) -> bool,
+    notes: &mut Notes,
+) -> Entry {
     let doubt = row.doubt.as_ref().map(|doubt| notes.index(format!("{sequence}, {variant}: {doubt}")));
     let cell = |printed: &Printed, best: bool, doubtful: bool| Cell {
         text: printed.to_string(),
@@ -88,7 +97,7 @@ fn entry(columns: &[Column], row: &PaperRow, [sequence, variant]: [&str; 2], not
     };
     let cells = columns.iter().map(|column| {
         let doubtful = row.doubt.as_ref().is_some_and(|doubt| doubt.starts_with(column.metric.id()));
-        let printed = row.value(column.metric).filter(|_| !column.fitted);
+        let printed = row.value(column.metric).filter(|_| stands(column));
         printed.map_or_else(Cell::empty, |p| cell(p, row.bold.contains(&column.metric), doubtful))
     });
     Entry {

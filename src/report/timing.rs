@@ -139,8 +139,9 @@ fn sum(parts: &[FitParts]) -> FitParts {
 }
 
 /// Where the time of the frames went, per table and variant, of tables of several sequences per sequence: seconds of posing,
-/// drawing and scoring, added over threads. None without a record of the results.
+/// drawing and scoring, and of fitting test poses where that was done, added over threads. None without a record of the results.
 pub fn phases(results: &Results, records: &Records) -> Option<Table> {
+    let fits = records.values().any(|record| record.seconds.fit > 0.0);
     let mut table = Table {
         sentences: vec![
             "Seconds, added over the threads. On a sequence a variant draws one avatar. Scoring holds what is drawn only to be \
@@ -160,6 +161,7 @@ pub fn phases(results: &Results, records: &Records) -> Option<Table> {
         ],
         ..Table::new("timing", "Where the time went")
     };
+    table.columns.extend(fits.then(|| time("fit", "Fit poses, s").about("and their scores")));
     let mut recorded = 0;
     for of in &results.tables {
         let Some(first) = of.sequences.first() else { continue };
@@ -170,7 +172,7 @@ pub fn phases(results: &Results, records: &Records) -> Option<Table> {
                 table.rows.push(Row::new(
                     id,
                     [of.table.title.as_str(), &variant.label, label],
-                    sums(seconds),
+                    sums(seconds, fits),
                 ));
             };
             for sequence in &of.sequences {
@@ -190,8 +192,10 @@ pub fn phases(results: &Results, records: &Records) -> Option<Table> {
 }
 
 /// How many frames there are, and the sums of their phases.
-fn sums(seconds: &[&Seconds]) -> Vec<Cell> {
+fn sums(seconds: &[&Seconds], fits: bool) -> Vec<Cell> {
     let sum =
         |of: fn(&Seconds) -> f64| Cell::number(seconds.iter().map(|s| of(s)).sum(), Digits::Significant(3));
-    vec![Cell::count(seconds.len()), sum(|s| s.pose), sum(|s| s.render), sum(|s| s.score)]
+    let mut cells = vec![Cell::count(seconds.len()), sum(|s| s.pose), sum(|s| s.render), sum(|s| s.score)];
+    cells.extend(fits.then(|| sum(|s| s.fit)));
+    cells
 }

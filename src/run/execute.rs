@@ -237,6 +237,7 @@ fn run_variant(
     let before_seconds = start.elapsed().as_secs_f64();
     let Scored { score, drawn, score_seconds } =
         frame.evaluate_view(view, avatar, &look, &job.protocol, before.wanted(wanted), scratch)?;
+    let start = Instant::now();
     let fitted = variant.fitted.as_ref().map(|options| {
         let fitted = avatar.fit_pose(view, &frame.truth, &look, options).and_then(|found| {
             let view = frame.in_pose(&found.pose)?;
@@ -246,10 +247,11 @@ fn run_variant(
         });
         fitted.unwrap_or_else(|error| FittedOutcome::Failed(error.to_string()))
     });
+    let fit = fitted.as_ref().map_or(0.0, |_| start.elapsed().as_secs_f64());
     let Drawn { visible_splats, pose_seconds, render_seconds, .. } = drawn;
     // Whatever is drawn in order to score is part of scoring.
     let seconds =
-        Seconds { pose: pose_seconds, render: render_seconds, score: before_seconds + score_seconds };
+        Seconds { pose: pose_seconds, render: render_seconds, score: before_seconds + score_seconds, fit };
     Ok((Outcome::Scored { score, visible_splats, fitted }, seconds))
 }
 

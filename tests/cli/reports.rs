@@ -215,6 +215,42 @@ fn results_are_of_the_published_schema() {
     assert!(violation(&schema, &odd).unwrap().contains("unknown"));
 }
 
+/// Scores of fitted test poses have their place in the schema, in the page, and in where the time went.
+#[test]
+fn fitted_test_poses_are_told_wherever_scores_are() {
+    let desk = Desk::new();
+    let fitted = include_str!("tiny.toml")
+        .replace("id = \"tiny\"", "id = \"fitted\"")
+        .replace("layout =", "test_poses = \"fitted\"\ntest_pose = { steps = 2 }\nlayout =");
+    desk.put("fitted.toml", &fitted);
+    desk.ok(args!["run", "fitted.toml", "--out", "run", "--limit", "1", "--html", "page.html"]);
+    let schema: Value = serde_json::from_str(include_str!("../../reports/schema/results.json")).unwrap();
+    let results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
+    assert_eq!(violation(&schema, &results), None);
+    let page = desk.read("page.html");
+    assert!(page.contains("PSNR (as given) over frames") && page.contains("PSNR (fitted) over frames"));
+    assert!(desk.ok(args!["report", "run", "--timing"]).contains("Fit poses, s"));
+    // An experiment that was written out and read again keeps its columns.
+    assert_eq!(desk.ok(args!["compare", "run", "run", "--strict"]).lines().count(), 1);
+}
+
+#[test]
+fn what_is_read_is_not_written_over() {
+    let desk = finished();
+    let tiny = desk.bytes("tiny.toml");
+    let results = desk.bytes("run/results.json");
+    for arguments in [
+        args!["report", "run", "--format", "html", "--out", "run/results.json"],
+        args!["compare", "run", "run", "--save", "json=run/frames.jsonl"],
+        args!["compare", "run/results.json", "run", "--save", "markdown=run/results.json"],
+        args!["run", "tiny.toml", "--limit", "1", "--out", "run", "--html", "tiny.toml"],
+        args!["run", "tiny.toml", "--limit", "1", "--out", "run", "--html", "run/results.json"],
+    ] {
+        desk.run(arguments).refuses(&["it is read; expected another file"], "an input as an output");
+    }
+    assert_eq!((tiny, results), (desk.bytes("tiny.toml"), desk.bytes("run/results.json")));
+}
+
 /// The circumstances of a run, and where its time went.
 #[test]
 fn a_run_says_what_made_it_and_how_long_that_took() {

@@ -1,7 +1,7 @@
 //! What moved between two results documents.
 
 use super::made_up::{results, run, table_7, with_holes};
-use skinsplat::experiment::{Outcome, Plan, Records, Source};
+use skinsplat::experiment::{FittedOutcome, Outcome, Plan, Records, Source};
 use skinsplat::report::compare::{
     Changes, Fate, Tolerances, Verdict, against_paper, compare, github, junit, markdown, text,
 };
@@ -105,6 +105,23 @@ fn scores_of_fitted_poses_are_compared_too() {
     let changes = compare(&fitted(1.0), &fitted(0.5), &Tolerances::default());
     assert_eq!((changes.verdict, changes.counts.regressed), (Verdict::Regressed, 1));
     assert!(text(&changes, false).contains("PSNR (fitted)"), "{}", text(&changes, false));
+    // A frame more in one of them: those of both are compared, each with its fitted score.
+    let more = |by: f64, frames: usize| {
+        let mut results = base();
+        let variant = &mut results.tables[0].sequences[0].variants[0];
+        for frame in &mut variant.frames {
+            let mut score = frame.score.clone().unwrap();
+            let psnr = score.value(MetricId::PSNR).unwrap();
+            score.values.insert(MetricId::PSNR, psnr + by);
+            frame.fitted = Some(FittedOutcome::Scored { score, turned_degrees: 1.0 });
+        }
+        variant.frames.truncate(frames);
+        results
+    };
+    let changes = compare(&more(1.0, 2), &more(-9.0, 3), &Tolerances::default());
+    assert_eq!(changes.verdict, Verdict::Regressed, "{:?}", changes.counts);
+    assert!(changes.frames.iter().any(|moved| moved.fitted && moved.worse));
+    assert!(github(&changes).contains("PSNR (fitted)"), "{}", github(&changes));
     let lost = compare(&fitted(1.0), &base(), &Tolerances::default());
     assert!(lost.counts.missing > 0 && !lost.is_good(), "{:?}", lost.counts);
 }

@@ -145,8 +145,8 @@ fn the_tables_ask_what_the_paper_asks() {
             vec![Some("hugs-original"), Some("quaternion-average")],
             vec![Some("ihuman-original"), Some(per_vertex)],
             vec![Some("splattingavatar-original"), Some(per_vertex), Some(per_vertex)],
-            vec![Some("animatable-original"), Some("quaternion-average")],
-            vec![Some("animatable-original"), Some("quaternion-average")],
+            vec![Some("animatable-original"), Some("quaternion-average"), Some("quaternion-average")],
+            vec![Some("animatable-original"), Some("quaternion-average"), Some("quaternion-average")],
             vec![Some("face-tbn+rotation=face-haha-scaled"), None, Some("quaternion-average")],
         ]
     );

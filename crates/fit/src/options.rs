@@ -308,6 +308,7 @@ pub(crate) fn within(section: &str, bounds: &[Bound]) -> Result<(), Error> {
     let expected = match (*range.start(), *range.end()) {
         (f64::MIN_POSITIVE, f64::MAX) => "a finite number above 0".to_owned(),
         (low, f64::MAX) => format!("a finite number, at least {low}"),
+        (f64::MIN_POSITIVE, high) => format!("above 0, at most {high}"),
         (low, high) => format!("{low} to {high}"),
     };
     let field = if section.is_empty() { (*field).to_owned() } else { format!("{section}.{field}") };

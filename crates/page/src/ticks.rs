@@ -13,10 +13,14 @@ pub(super) struct Axis {
 /// Most ticks of an axis.
 const MOST: f64 = 6.0;
 
+/// Larger numbers have no place on an axis: what is computed around them must stay finite.
+const LARGEST: f64 = 1e100;
+
 impl Axis {
-    /// An axis that shows all of these values; those that are not finite, or not above 0 on a logarithmic one, are left out.
+    /// An axis that shows all of these values; those that are not finite or beyond [`LARGEST`], or not above 0 on a logarithmic
+    /// one, are left out.
     pub(super) fn of(values: impl Iterator<Item = f64>, log: bool) -> Self {
-        let shown: Vec<f64> = values.filter(|v| v.is_finite() && (!log || *v > 0.0)).collect();
+        let shown: Vec<f64> = values.filter(|v| v.abs() <= LARGEST && (!log || *v > 0.0)).collect();
         // Nothing lies between two frames.
         let whole = shown.iter().all(|v| v.fract() == 0.0);
         let [low, high] = shown
@@ -113,6 +117,15 @@ fn round_step(at_least: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn absurd_numbers_have_no_place() {
+        for log in [false, true] {
+            let axis = Axis::of([1.0, 1.7e308, -1.7e308, f64::NAN, f64::INFINITY, 20.0].into_iter(), log);
+            assert!(axis.high <= 100.0 && axis.low.is_finite() && !axis.ticks.is_empty(), "{axis:?}");
+            assert_eq!(axis.at(1.7e308), None);
+        }
+    }
 
     #[test]
     fn ticks_are_round_and_few() {

@@ -69,7 +69,9 @@ fn line(
     ours: &Cell,
     printed: &Cell,
 ) -> Option<Line> {
-    let metric = MetricId::from_id(&column.key)?;
+    let (key, fitted) =
+        column.key.strip_suffix("-fitted").map_or((column.key.as_str(), false), |key| (key, true));
+    let metric = MetricId::from_id(key)?;
     let paper = printed.content.value()?;
     let decimals = printed.text.split_once('.').map_or(0, |(_, digits)| digits.len());
     let last_digit = (0..decimals).fold(0.5, |digit, _| digit / 10.0);
@@ -81,7 +83,7 @@ fn line(
         sequence,
         variant,
         metric: Some(metric),
-        fitted: false,
+        fitted,
         baseline: Some(paper),
         current,
         tolerance: Some(tolerance),

@@ -58,7 +58,7 @@ fn message(changes: &Changes, line: &Line) -> String {
 /// The frames behind a movement.
 fn frames(changes: &Changes, line: &Line, metric: MetricId) -> String {
     let of_line = changes.frames.iter().filter(|m| {
-        m.metric == metric
+        (m.metric, m.fitted) == (metric, line.fitted)
             && [&m.table, &m.sequence, &m.variant] == [&line.table, &line.sequence, &line.variant]
     });
     let names: Vec<&str> = of_line.take(FRAMES).map(|m| m.frame.as_str()).collect();

@@ -134,11 +134,15 @@ pub struct Line {
     pub frames: Vec<String>,
 }
 
+/// The title of a number, of poses as they are given or fitted.
+fn titled(title: &str, fitted: bool) -> String {
+    if fitted { format!("{title} (fitted)") } else { title.to_owned() }
+}
+
 impl Line {
     /// What its number is called.
     pub(super) fn title(&self) -> String {
-        let metric = self.metric.map_or("all", MetricId::title);
-        if self.fitted { format!("{metric} (fitted)") } else { metric.to_owned() }
+        titled(self.metric.map_or("all", MetricId::title), self.fitted)
     }
 }
 
@@ -158,6 +162,9 @@ pub struct Move {
     pub frame: String,
     /// The metric.
     pub metric: MetricId,
+    /// With the pose fitted to its image.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub fitted: bool,
     /// In the baseline; infinite is `null` in JSON.
     pub baseline: f64,
     /// In the current results; infinite is `null` in JSON.

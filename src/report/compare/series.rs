@@ -1,6 +1,7 @@
 //! One variant on one sequence, before and after.
 
 use super::{Changes, Fate, Line, Move, Tolerances};
+use crate::experiment::Shown;
 use crate::report::results::{FrameResult, SequenceResults, TableResults, VariantResults};
 use skinsplat_metrics::{FrameScore, MetricId, Protocol, Summary};
 use std::collections::BTreeMap;
@@ -42,11 +43,14 @@ impl<'a> Series<'a> {
         scored.map(|frame| (frame.name.as_str(), frame)).collect()
     }
 
-    /// The aggregate over some of its frames; none if the protocol's code is not at hand.
-    fn over(&self, frames: &[&FrameResult]) -> Option<Summary> {
+    /// The aggregate over some of its frames, of poses as they are given or `fitted`; none if the protocol's code is not at hand, or
+    /// not every pose was fitted.
+    fn over(&self, frames: &[&FrameResult], fitted: bool) -> Option<Summary> {
         let protocol = Protocol::parse(&self.table.protocol.id).ok()?;
-        let scores: Vec<FrameScore> = frames.iter().filter_map(|frame| frame.score.clone()).collect();
-        protocol.aggregate(&scores).ok()
+        let score =
+            |frame: &&FrameResult| if fitted { frame.fitted_score() } else { frame.score.as_ref() }.cloned();
+        let scores: Option<Vec<FrameScore>> = frames.iter().map(score).collect();
+        protocol.aggregate(&scores?).ok()
     }
 }
 
@@ -70,20 +74,25 @@ impl Pair<'_> {
             changes.compared -= 1;
             return;
         }
-        let of = |frames: &BTreeMap<&str, &FrameResult>, series: &Series<'_>| match whole {
-            true => series.variant.summary.clone(),
-            false => {
-                series.over(&shared.iter().filter_map(|name| frames.get(name).copied()).collect::<Vec<_>>())
-            }
-        };
-        let summaries = [of(&before, &self.before), of(&after, &self.after)];
-        self.numbers(summaries, false, tolerances, changes);
-        if whole {
-            let fitted = [&self.before, &self.after].map(|series| series.variant.fitted.clone());
-            self.numbers(fitted, true, tolerances, changes);
+        for fitted in [false, true] {
+            let of = |frames: &BTreeMap<&str, &FrameResult>, series: &Series<'_>| match (whole, fitted) {
+                (true, false) => series.variant.summary.clone(),
+                (true, true) => series.variant.fitted.clone(),
+                (false, _) => {
+                    let shared = shared.iter().filter_map(|name| frames.get(name).copied());
+                    series.over(&shared.collect::<Vec<_>>(), fitted)
+                }
+            };
+            let summaries = [of(&before, &self.before), of(&after, &self.after)];
+            self.numbers(summaries, fitted, tolerances, changes);
         }
         for name in shared {
-            self.frame(before[name], after[name], tolerances, changes);
+            for metric in MetricId::all() {
+                for fitted in [false, true] {
+                    let shown = Shown { metric, fitted };
+                    self.frame([before[name], after[name]], shown, tolerances, changes);
+                }
+            }
         }
     }
 
@@ -111,47 +120,46 @@ impl Pair<'_> {
         }
     }
 
-    /// A frame: it shows where a movement comes from, and counts by itself where that was asked for.
+    /// A number of a frame: it shows where a movement comes from, and counts by itself where that was asked for.
     fn frame(
         &self,
-        before: &FrameResult,
-        after: &FrameResult,
+        [before, after]: [&FrameResult; 2],
+        shown: Shown,
         tolerances: &Tolerances,
         changes: &mut Changes,
     ) {
+        let Shown { metric, fitted } = shown;
+        let (Some(a), Some(b)) = (before.value(shown), after.value(shown)) else { return };
+        if a == b {
+            return;
+        }
         let table = &self.before.table.experiment;
-        for metric in MetricId::all() {
-            let (Some(a), Some(b)) = (before.value(metric), after.value(metric)) else { continue };
-            if a == b {
-                continue;
-            }
-            let worse = (b < a) == metric.higher_is_better();
-            changes.frames.push(Move {
-                table: table.clone(),
-                sequence: self.before.sequence.id.clone(),
-                label: self.before.sequence.label.clone(),
-                variant: self.before.variant.id.clone(),
-                frame: before.name.clone(),
-                metric,
-                baseline: a,
-                current: b,
-                tolerances: (b - a).abs() / tolerances.of(table, metric),
-                worse,
-                pictures: None,
+        changes.frames.push(Move {
+            table: table.clone(),
+            sequence: self.before.sequence.id.clone(),
+            label: self.before.sequence.label.clone(),
+            variant: self.before.variant.id.clone(),
+            frame: before.name.clone(),
+            metric,
+            fitted,
+            baseline: a,
+            current: b,
+            tolerances: (b - a).abs() / tolerances.of(table, metric),
+            worse: (b < a) == metric.higher_is_better(),
+            pictures: None,
+        });
+        if let Some(tolerance) = tolerances.of_frame(metric)
+            && Fate::of(metric, a, b, tolerance) == Fate::Regressed
+        {
+            changes.lines.push(Line {
+                metric: Some(metric),
+                fitted,
+                baseline: Some(a),
+                current: Some(b),
+                tolerance: Some(tolerance),
+                frames: vec![before.name.clone()],
+                ..self.before.line(Fate::Regressed)
             });
-            let bound = tolerances.of_frame(metric);
-            if let Some(tolerance) = bound
-                && Fate::of(metric, a, b, tolerance) == Fate::Regressed
-            {
-                changes.lines.push(Line {
-                    metric: Some(metric),
-                    baseline: Some(a),
-                    current: Some(b),
-                    tolerance: Some(tolerance),
-                    frames: vec![before.name.clone()],
-                    ..self.before.line(Fate::Regressed)
-                });
-            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A comparison as tables, which every format of `skinsplat_table` writes.
 
-use super::{Changes, Fate, Line, Move};
+use super::{Changes, Fate, Line, Move, titled};
 use skinsplat_metrics::MetricId;
 use skinsplat_table::{Cell, Column, Digits, Label, Row, Table};
 
@@ -66,7 +66,8 @@ pub fn moved(changes: &Changes) -> Table {
         columns.extend([Column::text("before", "Picture before"), Column::text("after", "Picture after")]);
     }
     let row = |(r, m): (usize, &Move)| {
-        let labels = [m.table.as_str(), &m.sequence, &m.variant, &m.frame, m.metric.title()];
+        let metric = titled(m.metric.title(), m.fitted);
+        let labels = [m.table.as_str(), &m.sequence, &m.variant, &m.frame, &metric];
         let mut cells = vec![
             Cell::number(m.baseline, finer(m.metric)),
             Cell::number(m.current, finer(m.metric)),

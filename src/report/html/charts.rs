@@ -1,6 +1,7 @@
 //! Scores over frames, and fits over their iterations, as charts.
 
 use super::pictures::Links;
+use crate::experiment::Shown;
 use crate::report::results::{FrameResult, SequenceResults, TableResults, VariantResults};
 use skinsplat_metrics::MetricId;
 use skinsplat_page::{Chart, Part, Point, Series};
@@ -24,15 +25,20 @@ pub(super) fn over_frames(
     links: &Links<'_>,
     bends: &BTreeMap<String, f64>,
 ) -> Vec<Part> {
-    let shown = |metric: &MetricId| results.table.columns.iter().any(|column| column.key == metric.id());
-    let metrics: Vec<MetricId> = MetricId::of_frames().filter(shown).collect();
+    let has = |key: &str| results.table.columns.iter().any(|column| column.key == key);
+    let of = |metric: MetricId| [false, true].map(|fitted| Shown { metric, fitted });
+    let asked = |shown: &Shown| match shown.fitted {
+        false => has(shown.metric.id()),
+        true => has(&format!("{}-fitted", shown.metric.id())),
+    };
+    let scores: Vec<Shown> = MetricId::of_frames().flat_map(of).filter(asked).collect();
     let mut charts: Vec<Part> = Vec::new();
     for sequence in &results.sequences {
         let of = Charted { results, sequence, links, bends };
-        charts.extend(metrics.iter().filter_map(|&metric| of.part(metric)));
+        charts.extend(scores.iter().filter_map(|&shown| of.part(shown, scores.iter().any(|s| s.fitted))));
     }
     if charts.len() > OPEN {
-        let rest = charts.split_off(metrics.len().min(charts.len()));
+        let rest = charts.split_off(scores.len().min(charts.len()));
         charts.push(Part::Folded(format!("{} more charts over frames", rest.len()), rest));
     }
     charts
@@ -47,17 +53,23 @@ struct Charted<'a> {
 }
 
 impl Charted<'_> {
-    /// The views of a metric; none if no frame has it.
-    fn part(&self, metric: MetricId) -> Option<Part> {
-        let known = metric.metric();
+    /// The views of a score, which says whether its poses are as given where there are `both`; none if no frame has it.
+    fn part(&self, shown: Shown, both: bool) -> Option<Part> {
+        let known = shown.metric.metric();
+        let poses = match (both, shown.fitted) {
+            (false, _) => "",
+            (true, false) => " (as given)",
+            (true, true) => " (fitted)",
+        };
+        let name = format!("{}{poses}", shown.metric.title());
         let unit = if known.unit.is_empty() { String::new() } else { format!(", {}", known.unit) };
-        let (label, y) = (&self.sequence.label, format!("{}{unit}", metric.title()));
-        let titled = |view: &str| format!("{} {view}: {label}", metric.title());
+        let (label, y) = (&self.sequence.label, format!("{name}{unit}"));
+        let titled = |view: &str| format!("{name} {view}: {label}");
         let frames = Chart::lines(titled(VIEWS[0]), "frame", &y);
-        let frames = self.filled(frames, metric, POINTS, |frame| Some(frame.frame as f64))?;
+        let frames = self.filled(frames, shown, POINTS, |frame| Some(frame.frame as f64))?;
         let angle = "widest angle between joints that move one place, degrees";
         let bend = Chart::scatter(titled(VIEWS[1]), angle, &y);
-        let bend = self.filled(bend, metric, POINTS_APART, |frame| self.bends.get(&frame.key).copied());
+        let bend = self.filled(bend, shown, POINTS_APART, |frame| self.bends.get(&frame.key).copied());
         Some(match bend {
             Some(bend) => Part::Views(VIEWS.map(str::to_owned).into_iter().zip([frames, bend]).collect()),
             None => Part::Chart(frames),
@@ -68,7 +80,7 @@ impl Charted<'_> {
     fn filled(
         &self,
         mut chart: Chart,
-        metric: MetricId,
+        shown: Shown,
         most: usize,
         x: impl Fn(&FrameResult) -> Option<f64>,
     ) -> Option<Chart> {
@@ -87,7 +99,7 @@ impl Charted<'_> {
         let mut any = false;
         for variant in variants {
             let frames = variant.frames.iter().step_by(every);
-            let point = |frame: &FrameResult| self.point(variant, frame, metric, x(frame)?);
+            let point = |frame: &FrameResult| self.point(variant, frame, shown, x(frame)?);
             let points: Vec<Point> = frames.filter_map(point).collect();
             any |= !points.is_empty();
             chart = chart.with(Series::new(&variant.label, points));
@@ -101,15 +113,9 @@ impl Charted<'_> {
     }
 
     /// The score of a frame, which leads to its pictures where the page has them.
-    fn point(
-        &self,
-        variant: &VariantResults,
-        frame: &FrameResult,
-        metric: MetricId,
-        x: f64,
-    ) -> Option<Point> {
-        let value = frame.value(metric)?;
-        let digits = metric.decimals() + 1;
+    fn point(&self, variant: &VariantResults, frame: &FrameResult, shown: Shown, x: f64) -> Option<Point> {
+        let value = frame.value(shown)?;
+        let digits = shown.metric.decimals() + 1;
         let point =
             Point::new(x, value).titled(format!("{}, {}: {value:.digits$}", variant.label, frame.name));
         Some(match self.shown(frame) {
