@@ -148,7 +148,7 @@ impl<'a> Slurm<'a> {
                 return answer;
             }
             assert!(start.elapsed() < Duration::from_secs(300), "{what}: {}", self.ask("squeue; sinfo -N"));
-            std::thread::sleep(Duration::from_millis(100));
+            std::thread::sleep(Duration::from_millis(25));
         }
     }
 }
@@ -174,18 +174,34 @@ fn slurm_loses_a_node_and_the_tables_do_not_show_it() {
     desk.put("submit.sh", desk.ok([asked, args!["--", "ci"]].concat()));
     let slurm = Slurm::start(&desk);
     slurm.ask("bash submit.sh");
-    // A slice that has some of its records: its node goes down.
+    // A slice on n1 that has some of its records is held there, lest it ends before its node goes down.
+    let signal = |signal: &str, index: usize| {
+        format!(
+            "for p in $(pgrep -f 'ci --shar[d] {index}/4'); do \
+             if [ \"$(readlink /proc/$p/cwd)\" = \"$PWD\" ]; then kill -{signal} $p; fi; done || true"
+        )
+    };
+    let has_records = |index: &usize| {
+        let store = std::fs::read_to_string(desk.path(&format!("run/shard-{index:02}-of-04.jsonl")));
+        store.is_ok_and(|store| store.contains("{\"frame\":"))
+    };
+    let mut elsewhere = Vec::new();
     let index = slurm.wait("a slice on n1", |slurm| {
+        let index = (1..=4).filter(|index| !elsewhere.contains(index)).find(has_records)?;
+        slurm.ask(&signal("STOP", index));
         let jobs = slurm.ask("squeue --noheader --states=RUNNING --nodelist=n1 --format=%K");
-        let index: usize = jobs.trim().parse().ok()?;
-        let store = std::fs::read_to_string(desk.path(&format!("run/shard-{index:02}-of-04.jsonl"))).ok()?;
-        store.contains("{\"frame\":").then_some(index)
+        if jobs.lines().any(|job| job.trim() == index.to_string()) {
+            return Some(index);
+        }
+        slurm.ask(&signal("CONT", index));
+        elsewhere.push(index);
+        None
     });
     slurm.one_box("kill-node", "n1").exits(0, "a node goes down");
     let store = format!("run/shard-{index:02}-of-04.jsonl");
     let before = desk.read(&store);
     let job = slurm.wait("the slice is queued again", |slurm| {
-        let jobs = slurm.ask("squeue --noheader --states=PENDING --format='%A %K %r'");
+        let jobs = slurm.ask("squeue --noheader --states=PENDING --format='%F_%K %K %r'");
         let again = jobs.lines().find(|line| line.split(' ').nth(1) == Some(&index.to_string()))?;
         again.contains("BeginTime").then(|| again.split(' ').next().unwrap().to_owned())
     });
