@@ -6,6 +6,7 @@ use crate::experiment::{
     Variant,
 };
 use skinsplat_data::Capture;
+use skinsplat_fit::recipe::{Poses, Recipe};
 use skinsplat_metrics::{MetricId, ROTATION_JUMP_DEGREES};
 use std::collections::BTreeSet;
 
@@ -78,6 +79,17 @@ fn poses(experiment: &Experiment) -> Vec<String> {
             "Pose noise: {degrees} degrees per joint (root mean square, smooth in time, seed {}) on training and test poses of {on}",
             experiment.pose_noise_seed
         ));
+    }
+    let refines = |variant: &&Variant| {
+        let recipe = variant.avatar.fitting_recipe().and_then(|name| Recipe::parse(name).ok());
+        recipe.is_some_and(|recipe| recipe.poses == Poses::Refine)
+    };
+    let refined: Vec<&str> =
+        experiment.variants.iter().filter(refines).map(|variant| variant.label.as_str()).collect();
+    if !refined.is_empty() {
+        let all = refined.len() == experiment.variants.len();
+        let of = if all { "every variant".to_owned() } else { refined.join("; ") };
+        sentences.push(format!("Training poses: fitted with the avatar in {of}"));
     }
     if let Some(options) = experiment.fitted_test_poses() {
         sentences.push(format!(

@@ -2,7 +2,8 @@
 
 use crate::made_up::{TABLE_7, fitted_table_7, options, own_data, run, sequence};
 use skinsplat::experiment::{
-    AvatarSource, Dataset, Experiment, FittedOutcome, Outcome, Plan, Records, Role, TestPoses, plan,
+    AvatarRecipe, AvatarSource, Dataset, Experiment, FittedOutcome, Outcome, Plan, Records, Role, TestPoses,
+    plan,
 };
 use skinsplat::report::{self, TableResults};
 use skinsplat_metrics::MetricId;
@@ -102,6 +103,21 @@ fn noise_is_part_of_keys_and_captions() {
     assert_eq!(plan.jobs[0].variants[0].noise, training.noise);
     let sentence = "Pose noise: 5 degrees per joint";
     assert!(table(&some, run).table.sentences.iter().any(|own| own.starts_with(sentence)));
+}
+
+/// Refined training poses are never mixed in silently.
+#[test]
+fn refined_training_poses_are_in_the_caption() {
+    let said = |experiment: &Experiment| {
+        let found = table(experiment, run).table.sentences;
+        found.into_iter().find(|own| own.starts_with("Training poses: fitted with the avatar in "))
+    };
+    let mut experiment = with("");
+    assert_eq!(said(&experiment), None);
+    let label = experiment.variants[1].label.clone();
+    let AvatarRecipe::Fit { name, .. } = &mut experiment.variants[1].avatar else { panic!("a fit") };
+    name.push_str("+poses=refine");
+    assert!(said(&experiment).unwrap().ends_with(&label));
 }
 
 #[test]
