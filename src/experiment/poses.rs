@@ -95,7 +95,16 @@ pub(super) fn check(e: &Experiment, file: &str) -> Result<(), Error> {
     }
     e.test_pose
         .check("test_pose")
-        .map_err(|error| Error::invalid(file, "test_pose", error.to_string(), "numbers in range"))
+        .map_err(|error| Error::invalid(file, "test_pose", error.to_string(), "numbers in range"))?;
+    if e.test_poses == TestPoses::AsGiven && e.test_pose != PoseFit::default() {
+        let expected = "test_poses = \"fitted\" beside it: no test pose is fitted otherwise";
+        return Err(Error::invalid(file, "test_pose", "given, and of no effect", expected));
+    }
+    if e.pose_noise_seed != 0 && e.variants.iter().all(|variant| e.noise_of(variant).is_none()) {
+        let expected = "pose_noise, of the experiment or of a variant: there is none to draw otherwise";
+        return Err(Error::invalid(file, "pose_noise_seed", "given, and of no effect", expected));
+    }
+    Ok(())
 }
 
 /// Where test poses are fitted, every column of a metric of frames becomes two: as given, then fitted. An experiment that was

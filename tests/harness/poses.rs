@@ -105,6 +105,17 @@ fn noise_is_part_of_keys_and_captions() {
     assert!(table(&some, run).table.sentences.iter().any(|own| own.starts_with(sentence)));
 }
 
+#[test]
+fn keys_without_effect_are_refused() {
+    for (keys, field) in
+        [("test_pose = { steps = 3 }", "test_pose"), ("pose_noise_seed = 4", "pose_noise_seed")]
+    {
+        let refused = fitted_table_7(keys).unwrap_err().to_string();
+        assert!(refused.contains(field) && refused.contains("of no effect"), "{refused}");
+    }
+    assert!(fitted_table_7("test_poses = \"fitted\"\ntest_pose = { steps = 3 }").is_ok());
+}
+
 /// Refined training poses are never mixed in silently.
 #[test]
 fn refined_training_poses_are_in_the_caption() {
