@@ -6,14 +6,14 @@
 
 mod file;
 mod free;
+mod mesh;
 
 pub use file::RECIPES;
 pub use free::{Free, FreePosition, FreeRotation, FreeScale};
+pub use mesh::{MeshLayer, Stage};
 
 use crate::Error;
-use crate::options::{
-    Clothing, Cover, Moments, NOT_NEGATIVE, POSITIVE, PoseRefinement, Schedule, Sighting, within,
-};
+use crate::options::{Clothing, Cover, NOT_NEGATIVE, POSITIVE, PoseRefinement, Schedule, Sighting, within};
 use crate::shape::ShapeOptions;
 use serde::{Deserialize, Serialize};
 
@@ -255,44 +255,6 @@ pub enum LongThin {
     SplattingAvatar,
 }
 
-/// A textured mesh that is drawn with the Gaussians (HAHA): the body, its vertices moved onto the outlines in the masks,
-/// under a texture that is gathered from the training frames and then fitted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MeshLayer {
-    /// Side of the texture, texels.
-    pub texture: u32,
-    /// Learning rate of the texels' colours; 0 leaves them as gathered.
-    pub rate: f32,
-    /// See [`TextureInit::prior_weight`](crate::texture::TextureInit).
-    #[serde(default = "defaults::prior_weight")]
-    pub prior_weight: f32,
-    /// See [`TextureInit::gutter`](crate::texture::TextureInit).
-    #[serde(default = "defaults::gutter")]
-    pub gutter: usize,
-    /// Of Adam's steps on the texels.
-    #[serde(default = "defaults::texel_moments")]
-    pub moments: Moments,
-    /// Share of the iterations in which Gaussians are fitted without the mesh: HAHA's first stage.
-    #[serde(default)]
-    pub gaussians_first: f32,
-    /// Share of the iterations after that in which the texture is fitted without Gaussians, in poses that stay as they are:
-    /// its second stage. In the rest both are drawn and fitted together.
-    #[serde(default)]
-    pub texture_next: f32,
-}
-
-/// What is drawn and fitted in an iteration of a hybrid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Gaussians alone, as in every fit without a mesh.
-    Gaussians,
-    /// The textured mesh alone.
-    Texture,
-    /// Both.
-    Together,
-}
-
 /// How Gaussians come and go: adaptive density control of 3DGS, on a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -326,20 +288,6 @@ pub struct Densify {
 
 /// Values of fields that recipes need not name.
 mod defaults {
-    use crate::options::Moments;
-
-    pub(super) fn prior_weight() -> f32 {
-        0.02
-    }
-
-    pub(super) fn gutter() -> usize {
-        8
-    }
-
-    pub(super) fn texel_moments() -> Moments {
-        Moments::with_epsilon(1e-8)
-    }
-
     pub(super) fn most_crossings() -> u32 {
         16
     }
@@ -393,15 +341,7 @@ impl Recipe {
 
     /// What is drawn and fitted at an iteration out of a number.
     pub fn stage_at(&self, iteration: u32, iterations: u32) -> Stage {
-        let Some(MeshLayer { gaussians_first, texture_next, .. }) = self.mesh else {
-            return Stage::Gaussians;
-        };
-        let before = |share: f32| iteration < (f64::from(share) * f64::from(iterations)).round() as u32;
-        match () {
-            () if before(gaussians_first) => Stage::Gaussians,
-            () if before(gaussians_first + texture_next) => Stage::Texture,
-            () => Stage::Together,
-        }
+        self.mesh.as_ref().map_or(Stage::Gaussians, |mesh| mesh.stage_at(iteration, iterations))
     }
 
     /// What is minimised in a stage: Gaussians without a mesh beside them are not asked to be transparent.
@@ -483,24 +423,7 @@ impl Recipe {
             let expected = "free.position and free.rotation that are not measured from the start";
             return refuse("densify", "new Gaussians have no start".to_owned(), expected);
         }
-        if let Some(mesh) = &self.mesh {
-            if mesh.texture == 0 {
-                return refuse("mesh.texture", mesh.texture.to_string(), "at least 1 texel");
-            }
-            if !(mesh.rate.is_finite() && mesh.rate >= 0.0) {
-                return refuse("mesh.rate", mesh.rate.to_string(), "a finite number, at least 0");
-            }
-            let shares = [mesh.gaussians_first, mesh.texture_next];
-            if shares.iter().any(|share| !(0.0..=1.0).contains(share)) || shares.iter().sum::<f32>() > 1.0 {
-                let value = format!("{} and {}", shares[0], shares[1]);
-                return refuse(
-                    "mesh.gaussians_first and mesh.texture_next",
-                    value,
-                    "shares that add up to at most 1",
-                );
-            }
-            mesh.moments.check("mesh.moments")?;
-        }
+        self.mesh.as_ref().map_or(Ok(()), |mesh| mesh.check(&self.id))?;
         self.pose.check("pose")?;
         self.clothing.check("clothing")?;
         self.sighting.check("sighting")?;

@@ -5,6 +5,7 @@
 //! Everything random is a function of the seed and the iteration, so that a fit which is resumed from a checkpoint ends
 //! in the same bits as one that was never interrupted.
 
+mod backdrop;
 mod checkpoint;
 mod density;
 mod frames;
@@ -14,6 +15,7 @@ mod poses;
 mod regularise;
 mod walk;
 
+pub(crate) use backdrop::composite;
 pub use checkpoint::Checkpoint;
 pub use poses::RefinedPose;
 
@@ -23,7 +25,8 @@ use super::shape::{Ended, ShapeFit, fit_shape};
 use super::surface::{SurfaceInit, surface_init};
 use super::texture::TexturedBody;
 use crate::options::Clothing;
-use crate::recipe::{FitBackground, FitOptions, Poses, Recipe, Stage, Surface};
+use crate::recipe::{FitOptions, Poses, Recipe, Stage, Surface};
+use backdrop::background;
 use density::Density;
 use frames::TrainingFrames;
 use layer::Layer;
@@ -31,9 +34,8 @@ use parameters::{Parameters, RatesNow};
 use poses::TrainingPoses;
 use serde::{Deserialize, Serialize};
 use skinsplat_core::math::portable;
-use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::scene::{
-    Avatar, AvatarGradient, Binding, BodyGradient, Image, Mask, Posed, PosedBody, PosedGradient, Rendered,
+    Avatar, AvatarGradient, Binding, BodyGradient, Image, Posed, PosedBody, PosedGradient, Rendered,
     RenderedGradient, RestBody,
 };
 use skinsplat_data::sequence::Sequence;
@@ -470,31 +472,6 @@ impl Scratch {
             of_avatar: AvatarGradient::default(),
             of_body: BodyGradient::default(),
         }
-    }
-}
-
-/// The colour behind avatar and truth.
-fn background(choice: FitBackground, seed: u64, iteration: u32) -> [f32; 3] {
-    match choice {
-        FitBackground::White => [1.0; 3],
-        FitBackground::Black => [0.0; 3],
-        FitBackground::Random => {
-            let mut random =
-                SplitMix64::new(!seed ^ u64::from(iteration).wrapping_mul(0xD6E8_FEB8_6659_FD93));
-            random.next_u64();
-            [random.unit_f32(), random.unit_f32(), random.unit_f32()]
-        }
-    }
-}
-
-/// Straight colours over a background, into memory that is kept.
-pub(crate) fn composite(rgb: &Image, alpha: &Mask, background: [f32; 3], out: &mut Image) {
-    if (out.width(), out.height()) != (rgb.width(), rgb.height()) {
-        *out = Image::filled(rgb.width(), rgb.height(), background);
-    }
-    let pixels = rgb.pixels().iter().zip(alpha.values());
-    for (out, (colour, &a)) in out.pixels_mut().iter_mut().zip(pixels) {
-        *out = [0, 1, 2].map(|c| a * colour[c] + (1.0 - a) * background[c]);
     }
 }
 
