@@ -70,7 +70,8 @@ struct Check {
     /// The convention of the answer [default: that of the vectors in DIR; of PLYs skinsplat]
     #[arg(long, value_name = "C")]
     convention: Option<Convention>,
-    /// Which pose a single PLY is, counted from 0 [default: the number in its name, else the one that fits]
+    /// Which pose the answer is, counted from 0, if it is a single one [default: what it says itself, the number in the name of a PLY, else the one
+    /// that fits]
     #[arg(long, value_name = "N")]
     frame: Option<usize>,
     /// How far numbers may be off: metres, or relative to the size of what is compared

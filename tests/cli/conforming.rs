@@ -83,7 +83,13 @@ fn what_cannot_be_read_is_one_line() {
     desk.put("nan.json", "{\"means\": [NaN]}");
     desk.put("half.bin", [b"SKINCONF".as_slice(), &[1, 0, 0, 0, 1, 0, 0, 0]].concat());
     desk.put("short.json", "{\"means\": [[[0, 0, 0]]]}");
+    desk.put("nothing.json", "");
     for (arguments, parts) in [
+        (args!["conform", "check", "rig", "nothing.json"], vec!["nothing.json", "an empty file"]),
+        (
+            args!["conform", "check", "rig", "rig/vectors.json", "--frame", "3"],
+            vec!["vectors.json", "--frame: 3", "itself"],
+        ),
         (args!["conform", "check", "rig", "missing.ply"], vec!["missing.ply", "cannot read"]),
         (args!["conform", "check", "rig", "empty.json"], vec!["empty.json", "no field"]),
         (args!["conform", "check", "rig", "nan.json"], vec!["nan.json", "NaN"]),

@@ -51,18 +51,19 @@ pub fn check(folder: &Path, answer: &Path, options: &Options) -> Result<Report, 
         // PLYs of the rig are in the axes of their format, whatever the convention of its vectors.
         Storage::Logarithms => Convention::default(),
     });
+    let vectors = options.convention.unwrap_or(exported.convention);
     let declared = options.convention.is_some() || convention != Convention::default();
     given.agrees_with(&convention, answer)?;
+    let pipeline = Pipeline { rig: &rig, convention, vectors, storage: given.storage };
     let frames = match given.frames.clone() {
         Some(frames) => frames,
         None => {
-            let frame = which_pose(&rig, convention, &given, options.tolerance);
+            let frame = which_pose(&pipeline, &given, options.tolerance);
             given.notes.push(format!("taken for pose {frame}, by its values (--frame says otherwise)"));
             vec![frame]
         }
     };
-    describe_alike(&rig, convention, &mut given, &frames, options.tolerance);
-    let pipeline = Pipeline { rig: &rig, convention, storage: given.storage };
+    describe_alike(&pipeline, &mut given, &frames, options.tolerance);
     let judge = Judge { pipeline, answer: &given, frames, tolerance: options.tolerance };
     let right = judge.agreement(&Model::default());
     if right.matches == given.present {
@@ -99,10 +100,9 @@ fn other_convention(judge: &Judge<'_>, right: &Agreement) -> Option<Convention> 
 
 /// The pose that a single file is of: that which it agrees with, be it in another order, else that whose difference is explained most simply, else
 /// that with the nearest means.
-fn which_pose(rig: &Rig, convention: Convention, answer: &Answer, tolerance: f64) -> usize {
-    let pipeline = Pipeline { rig, convention, storage: answer.storage };
-    let judge = |frame: usize| Judge { pipeline, answer, frames: vec![frame], tolerance };
-    let all = 0..rig.poses.len();
+fn which_pose(pipeline: &Pipeline<'_>, answer: &Answer, tolerance: f64) -> usize {
+    let judge = |frame: usize| Judge { pipeline: *pipeline, answer, frames: vec![frame], tolerance };
+    let all = 0..pipeline.rig.poses.len();
     let agreements: Vec<Agreement> = all.clone().map(|k| judge(k).agreement(&Model::default())).collect();
     if let Some(frame) = agreements.iter().position(|a| a.matches == answer.present) {
         return frame;
@@ -127,15 +127,15 @@ fn which_pose(rig: &Rig, convention: Convention, answer: &Answer, tolerance: f64
 
 /// Quaternions and scales that describe the right ellipsoids by other axes are taken for the right ones: nobody can see the
 /// difference.
-fn describe_alike(rig: &Rig, convention: Convention, answer: &mut Answer, frames: &[usize], tolerance: f64) {
+fn describe_alike(pipeline: &Pipeline<'_>, answer: &mut Answer, frames: &[usize], tolerance: f64) {
     let described: Fields = [Field::Quaternions, Field::Scales].into_iter().collect();
     if !described.without(answer.present).is_empty() {
         return;
     }
-    let pipeline = Pipeline { rig, convention, storage: answer.storage };
-    let judge = Judge { pipeline, answer, frames: frames.to_vec(), tolerance };
+    let judge = Judge { pipeline: *pipeline, answer, frames: frames.to_vec(), tolerance };
+    let convention = pipeline.convention;
     let right = judge.predict(&Model::default());
-    let matches = judge.compare(&right, false).matches;
+    let matches = judge.compare(&right, &Model::default()).matches;
     if described.without(matches).is_empty() {
         return;
     }

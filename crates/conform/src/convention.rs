@@ -178,6 +178,27 @@ impl Convention {
         turned_quaternion(&self.map, q)
     }
 
+    /// Such a rotation, back in this project's axes.
+    pub(crate) fn rotation_back(&self, q: [f64; 4]) -> [f64; 4] {
+        turned_quaternion(&matrix3::transpose(self.map), q)
+    }
+
+    /// What one of this project's axes is called here.
+    pub(crate) fn axis_name(&self, axis: usize) -> &'static str {
+        let named = ["x", "y", "z"].into_iter().zip(self.map).find(|(_, row)| row[axis] != 0.0);
+        named.map_or("", |(name, _)| name)
+    }
+
+    /// A signed permutation of this project's axes as it is seen here: `(x, -z, y)`.
+    pub(crate) fn shown(&self, turn: &Matrix3<f64>) -> String {
+        let seen = matrix3::multiply(matrix3::multiply(self.map, *turn), matrix3::transpose(self.map));
+        let entry = |row: [f64; 3]| {
+            let named = ["x", "y", "z"].into_iter().zip(row).find(|(_, v)| *v != 0.0);
+            named.map_or(String::new(), |(name, v)| format!("{}{name}", if v < 0.0 { "-" } else { "" }))
+        };
+        format!("({})", seen.map(entry).join(", "))
+    }
+
     /// A motion x' = L x + t, as a 4x4 matrix in the order of the convention.
     pub fn matrix(&self, linear: Matrix3<f64>, translation: [f64; 3]) -> [f64; 16] {
         let back = matrix3::transpose(self.map);
@@ -250,8 +271,17 @@ pub(crate) fn upper(m: &Matrix3<f64>) -> [f64; 6] {
 
 /// SH that say along M d what they said along d.
 pub(crate) fn turn_sh(map: &Matrix3<f64>, sample: &mut Sample) {
-    let mirrored = matrix3::determinant(*map) < 0.0;
     let mut coefficients = sh_of(sample);
+    if coefficients.as_flattened().iter().all(|c| *c == 0.0) {
+        return;
+    }
+    turn_coefficients(map, &mut coefficients);
+    put_sh(sample, &coefficients);
+}
+
+/// The same, of bare coefficients.
+pub(crate) fn turn_coefficients(map: &Matrix3<f64>, coefficients: &mut [[f64; 3]; 16]) {
+    let mirrored = matrix3::determinant(*map) < 0.0;
     let mut proper = *map;
     if mirrored {
         // M = P diag(1, 1, -1): the basis functions of odd l + m change their sign with z.
@@ -263,8 +293,7 @@ pub(crate) fn turn_sh(map: &Matrix3<f64>, sample: &mut Sample) {
         }
     }
     let q = rotation::matrix_to_quaternion(proper);
-    sh::Rotation::from_quaternion(q, 3).apply(&mut coefficients);
-    put_sh(sample, &coefficients);
+    sh::Rotation::from_quaternion(q, 3).apply(coefficients);
 }
 
 /// Degree l and order m of a coefficient.

@@ -44,7 +44,8 @@ pub fn export(folder: &Path, cases: Cases, convention: &Convention) -> Result<()
     for frame in 0..rig.poses.len() {
         write_posed(&expected.join(format!("pose_{frame:04}.ply")), &rig, frame)?;
     }
-    let pipeline = Pipeline { rig: &rig, convention: *convention, storage: Storage::Activated };
+    let pipeline =
+        Pipeline { rig: &rig, convention: *convention, vectors: *convention, storage: Storage::Activated };
     write(&folder.join("vectors.json"), &vectors::json(&pipeline))?;
     let bytes = vectors::binary(&pipeline);
     atomic::write(&folder.join("vectors.bin"), |file| file.write_all(&bytes))?;
@@ -91,7 +92,8 @@ fn camera_json(rig: &Rig) -> String {
 
 /// The expected Gaussians of a pose, as a static PLY.
 fn write_posed(path: &Path, rig: &Rig, frame: usize) -> Result<(), Error> {
-    let pipeline = Pipeline { rig, convention: Convention::default(), storage: Storage::Logarithms };
+    let convention = Convention::default();
+    let pipeline = Pipeline { rig, convention, vectors: convention, storage: Storage::Logarithms };
     let mut posed = Gaussians { sh_degree: 3, ..Gaussians::default() };
     let three = |sample: &Sample, field: Field| -> Vec3 {
         let at = range(field).start;

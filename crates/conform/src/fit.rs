@@ -1,7 +1,7 @@
 //! Bugs with a number in them that no catalogue lists: read from the answer, then put to the test like any other.
 
 use super::judge::{Judge, Model};
-use super::sample::{Field, Sample, range};
+use super::sample::{Field, Fields, Sample, range};
 use serde_json::{Value, json};
 
 /// What may be read from an answer.
@@ -13,10 +13,12 @@ pub(crate) enum Fit {
     Lengths,
     /// Basis functions with the other sign.
     Signs,
+    /// Half floats, perhaps widened again.
+    Half,
 }
 
 impl Fit {
-    pub(crate) const ALL: [Self; 3] = [Self::Sums, Self::Lengths, Self::Signs];
+    pub(crate) const ALL: [Self; 4] = [Self::Sums, Self::Lengths, Self::Signs, Self::Half];
 
     /// The model with what is read from the answer; `None` if nothing can be read.
     pub(crate) fn fitted(self, judge: &Judge<'_>, model: &Model) -> Option<Model> {
@@ -34,8 +36,41 @@ impl Fit {
                 fitted.any_length = true;
             }
             Self::Signs => fitted.signs = signs(judge, &predicted)?,
+            Self::Half => {
+                if judge.answer.halves.is_empty() {
+                    return None;
+                }
+                fitted.half = true;
+            }
         }
         Some(fitted)
+    }
+
+    /// The model with nothing but what this read from the answer for `fitted`, in which other bugs are too.
+    pub(crate) fn alone(self, fitted: &Model) -> Model {
+        let mut alone = Model::default();
+        match self {
+            Self::Sums => {
+                alone.sums.clone_from(&fitted.sums);
+                alone.wiring.keeps_sum = true;
+            }
+            Self::Lengths => alone.any_length = true,
+            Self::Signs => alone.signs = fitted.signs,
+            Self::Half => alone.half = true,
+        }
+        alone
+    }
+
+    /// Fields that it may change, whatever else is wrong.
+    pub(crate) fn affects(self, judge: &Judge<'_>) -> Fields {
+        let colours: Fields = Field::SH.into_iter().collect();
+        match self {
+            // SH turn by directions of sums alone.
+            Self::Sums => judge.answer.present.without(colours),
+            Self::Lengths => [Field::Quaternions].into_iter().collect(),
+            Self::Signs => judge.answer.present.and(colours),
+            Self::Half => judge.answer.halves,
+        }
     }
 
     pub(crate) fn kind(self) -> &'static str {
@@ -43,6 +78,7 @@ impl Fit {
             Self::Sums => "weights-not-normalised",
             Self::Lengths => "not-normalised",
             Self::Signs => "sh-basis-sign",
+            Self::Half => "half-precision",
         }
     }
 
@@ -51,6 +87,9 @@ impl Fit {
             Self::Sums => "weights do not sum to one and were not divided by their sum: means are scaled",
             Self::Lengths => "quaternions do not have unit length",
             Self::Signs => "coefficients of SH have the other sign: the signs of another basis",
+            Self::Half => {
+                "every number is one that a half float holds: rounded to 11 bits, which is too few for the tolerance"
+            }
         }
     }
 
@@ -75,8 +114,23 @@ impl Fit {
                 let flipped: Vec<usize> = (0..16).filter(|&k| model.signs[k]).collect();
                 json!({ "coefficients": flipped, "where": "in the answer" })
             }
+            Self::Half => rounded(judge, model),
         }
     }
+}
+
+/// The number that lost most.
+fn rounded(judge: &Judge<'_>, model: &Model) -> Value {
+    let worst = judge.worst(&judge.predict(model), judge.answer.halves, 1);
+    let Some(worst) = worst.first() else { return json!({}) };
+    let off = |k: &usize| (worst.expected[*k].abs() - worst.got[*k].abs()).abs();
+    let Some(k) = (0..worst.got.len()).max_by(|a, b| off(a).total_cmp(&off(b))) else { return json!({}) };
+    json!({
+        "largest_rounding": worst.error,
+        "at": format!("{}[{}][{}][{k}]", worst.field.name(), worst.pose, worst.gaussian),
+        "read": worst.got[k],
+        "expected": worst.expected[k],
+    })
 }
 
 /// Per Gaussian, the factor between its means and the predicted ones, the same in all poses.

@@ -9,6 +9,7 @@ mod convention;
 mod error;
 mod export;
 mod fit;
+mod half_floats;
 mod judge;
 mod manifest;
 mod order;
@@ -19,6 +20,7 @@ mod sample;
 mod search;
 mod vectors;
 mod wiring;
+mod words;
 
 pub use answer::Answer;
 pub use check::{Options, check};
@@ -32,7 +34,9 @@ pub use sample::{Field, Storage};
 /// Every kind of bug that an answer is searched for, with a sentence on each, sorted.
 pub fn kinds() -> Vec<(&'static str, String)> {
     let mut kinds: Vec<(&'static str, String)> = Vec::new();
-    let changes = change::Change::all().into_iter().map(|change| (change.kind(), change.summary()));
+    let changes = change::Change::all(&Convention::default())
+        .into_iter()
+        .map(|change| (change.kind(), change.summary()));
     let fits = fit::Fit::ALL.map(|fit| (fit.kind(), fit.summary().to_owned()));
     for (kind, summary) in changes.chain(fits) {
         if !kinds.iter().any(|(known, _)| *known == kind) {

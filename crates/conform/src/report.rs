@@ -1,10 +1,13 @@
 //! What `check` found, for people and for programs.
 
+use super::change::Change;
 use super::judge::{Agreement, Judge, Model, Worst};
-use super::sample::{Field, Fields};
-use super::search::{Explanation, Findings, Found};
+use super::sample::{Field, Fields, Sample, range};
+use super::search::{Cause, Explanation, Findings, Found};
+use super::wiring::Blend;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
+use skinsplat_core::math::rotation;
 use std::fmt::Write;
 
 /// Does the engine compute what it should?
@@ -166,7 +169,7 @@ fn explanations(judge: &Judge<'_>, findings: &Findings) -> Vec<Value> {
     let mut bugs: Vec<(Value, Vec<usize>)> = Vec::new();
     for (number, Explanation { bugs: found, residual, .. }) in findings.explanations.iter().enumerate() {
         for bug in found {
-            let value = bug_value(bug, *residual);
+            let value = bug_value(judge, bug, *residual);
             let same = |(known, _): &&mut (Value, Vec<usize>)| {
                 known["kind"] == value["kind"] && known["fields"] == value["fields"]
             };
@@ -191,7 +194,7 @@ fn names(fields: Fields) -> Vec<&'static str> {
     fields.iter().map(Field::name).collect()
 }
 
-fn bug_value(found: &Found, residual: f64) -> Value {
+fn bug_value(judge: &Judge<'_>, found: &Found, residual: f64) -> Value {
     let mut value = Map::new();
     value.insert("kind".to_owned(), json!(found.cause.kind()));
     value.insert("summary".to_owned(), json!(found.cause.summary()));
@@ -199,8 +202,25 @@ fn bug_value(found: &Found, residual: f64) -> Value {
     if let Value::Object(details) = &found.details {
         value.extend(details.clone());
     }
+    if let Cause::Change(change @ Change::Blend(Blend::Power(..))) = &found.cause {
+        value.insert("degrees_off".to_owned(), json!(degrees_off(judge, change)));
+    }
     value.insert("residual".to_owned(), json!(residual));
     Value::Object(value)
+}
+
+/// By how much a change turns Gaussians, at most, to three digits.
+fn degrees_off(judge: &Judge<'_>, change: &Change) -> f64 {
+    let mut changed = Model::default();
+    change.apply(&mut changed.wiring);
+    let quaternion = |sample: &Sample| -> [f64; 4] {
+        let at = range(Field::Quaternions).start;
+        std::array::from_fn(|k| sample[at + k])
+    };
+    let (right, wrong) = (judge.predict(&Model::default()), judge.predict(&changed));
+    let angles = right.iter().zip(&wrong).map(|(a, b)| rotation::angle_between(quaternion(a), quaternion(b)));
+    let most = angles.fold(0.0, f64::max).to_degrees();
+    format!("{most:.2e}").parse().unwrap_or(most)
 }
 
 fn unknown(judge: &Judge<'_>, findings: &Findings) -> Value {

@@ -95,6 +95,7 @@ pub(crate) struct Findings {
 }
 
 /// A single bug tried on the answer.
+#[derive(Clone)]
 struct Single {
     cause: Cause,
     model: Model,
@@ -109,11 +110,11 @@ pub(crate) fn explain(judge: &Judge<'_>, right: &Agreement) -> Findings {
     let singles = singles(judge, wrong);
     let alone = alone(judge, &singles, wrong);
     if !alone.is_empty() {
-        return Findings { explanations: simplest(alone), unexplained: Fields::default() };
+        return Findings { explanations: simplest(judge, alone), unexplained: Fields::default() };
     }
     let pairs = pairs(judge, &singles, wrong);
     if !pairs.is_empty() {
-        return Findings { explanations: simplest(pairs), unexplained: Fields::default() };
+        return Findings { explanations: simplest(judge, pairs), unexplained: Fields::default() };
     }
     by_field(judge, &singles, wrong)
 }
@@ -121,12 +122,15 @@ pub(crate) fn explain(judge: &Judge<'_>, right: &Agreement) -> Findings {
 /// One bug that explains everything; none if there is no such one.
 pub(crate) fn explain_by_one(judge: &Judge<'_>, right: &Agreement) -> Vec<Explanation> {
     let wrong = judge.answer.present.without(right.matches);
-    simplest(alone(judge, &singles(judge, wrong), wrong))
+    simplest(judge, alone(judge, &singles(judge, wrong), wrong))
 }
 
 fn singles(judge: &Judge<'_>, wrong: Fields) -> Vec<Single> {
     let reference = judge.probe(&Model::default());
-    let causes = Change::all().into_iter().map(Cause::Change).chain(Fit::ALL.map(Cause::Fit));
+    let halves = !judge.answer.halves.is_empty();
+    let fits = Fit::ALL.into_iter().filter(|fit| halves || *fit != Fit::Half);
+    let changes = Change::all(&judge.pipeline.vectors).into_iter().map(Cause::Change);
+    let causes = changes.chain(fits.map(Cause::Fit));
     causes.map(|cause| single(judge, cause, &reference, wrong)).collect()
 }
 
@@ -134,14 +138,12 @@ fn singles(judge: &Judge<'_>, wrong: Fields) -> Vec<Single> {
 fn single(judge: &Judge<'_>, cause: Cause, reference: &[Sample], wrong: Fields) -> Single {
     // What cannot be read from the answer alone may be read with another bug in place.
     let model = cause.applied(judge, &Model::default()).unwrap_or_default();
-    let agreement = if judge.plausible(&model, wrong).is_empty() {
-        Agreement { errors: [f64::INFINITY; 10], matches: Fields::default() }
-    } else {
-        judge.agreement(&model)
-    };
+    let agreement =
+        if judge.plausible(&model, wrong).is_empty() { Agreement::none() } else { judge.agreement(&model) };
     let affects = match cause {
         // Seen only together with another.
-        Cause::Change(Change::KeepsSum) | Cause::Fit(_) => judge.answer.present,
+        Cause::Change(Change::KeepsSum) => judge.answer.present,
+        Cause::Fit(fit) => fit.affects(judge),
         Cause::Change(_) => differing(judge, reference, &judge.probe(&model)),
     };
     Single { cause, model, agreement, affects }
@@ -168,7 +170,7 @@ fn largest_error(errors: &[f64; 10], fields: Fields) -> f64 {
 
 fn found(judge: &Judge<'_>, cause: Cause, model: &Model, fields: Fields) -> Found {
     let details = match cause {
-        Cause::Change(change) => change.details(),
+        Cause::Change(change) => change.details(&judge.pipeline),
         Cause::Fit(fit) => fit.details(judge, model),
     };
     Found { cause, details, fields }
@@ -202,20 +204,15 @@ fn pairs(judge: &Judge<'_>, singles: &[Single], wrong: Fields) -> Vec<Explanatio
 }
 
 fn pair(judge: &Judge<'_>, a: &Single, b: &Single, wrong: Fields) -> Option<Explanation> {
-    let apart = a.agreement.matches.union(b.agreement.matches).and(wrong);
-    let rest = wrong.without(apart);
-    // What only one of them changes looks the same with both.
-    if !rest.without(a.affects.and(b.affects)).is_empty() {
-        return None;
-    }
     // A bug that was fitted is read from the answer with the other in place.
     let (first, second) = if matches!(a.cause, Cause::Fit(_)) { (b, a) } else { (a, b) };
-    let after = second.cause.applied(judge, &first.model);
-    let both = after.or_else(|| first.cause.applied(judge, &second.model))?;
-    if judge.plausible(&both, rest) != rest {
+    let (both, second) = &together(judge, first, second, wrong)?;
+    let apart = first.agreement.matches.union(second.agreement.matches).and(wrong);
+    let rest = wrong.without(apart);
+    if !judge.is_plausible(both, rest) {
         return None;
     }
-    let agreement = judge.agreement(&both);
+    let agreement = judge.agreement(both);
     if !rest.without(agreement.matches).is_empty() {
         return None;
     }
@@ -223,23 +220,76 @@ fn pair(judge: &Judge<'_>, a: &Single, b: &Single, wrong: Fields) -> Option<Expl
         let own = wrong.and(single.affects.union(single.agreement.matches));
         own.without(apart.without(single.agreement.matches).without(agreement.matches))
     };
-    let errors: [f64; 10] =
-        std::array::from_fn(|k| a.agreement.errors[k].min(b.agreement.errors[k]).min(agreement.errors[k]));
+    let errors: [f64; 10] = std::array::from_fn(|k| {
+        first.agreement.errors[k].min(second.agreement.errors[k]).min(agreement.errors[k])
+    });
     Some(Explanation {
         bugs: vec![
-            found(judge, first.cause, &both, explained(first)),
-            found(judge, second.cause, &both, explained(second)),
+            found(judge, first.cause, both, explained(first)),
+            found(judge, second.cause, both, explained(second)),
         ],
         contradicted: judge.answer.present.without(agreement.matches).len(),
         residual: largest_error(&errors, wrong),
     })
 }
 
+/// The model with two bugs, and the second by itself; `None` if they cannot explain all that is wrong.
+fn together(judge: &Judge<'_>, first: &Single, second: &Single, wrong: Fields) -> Option<(Model, Single)> {
+    let left = wrong.without(first.agreement.matches);
+    match second.cause {
+        Cause::Change(_) => {
+            // What only one of them changes looks the same with both.
+            let left = left.without(second.agreement.matches);
+            let changed = first.affects.and(second.affects);
+            if !left.without(changed).is_empty() {
+                return None;
+            }
+            Some((second.cause.applied(judge, &first.model)?, second.clone()))
+        }
+        Cause::Fit(fit) => {
+            if !left.without(second.affects).is_empty() || first.affects.and(wrong).is_empty() {
+                return None;
+            }
+            let both = fit.fitted(judge, &first.model)?;
+            let read = alone_as_in(judge, fit, &both, (first, second), wrong);
+            Some((both, read))
+        }
+    }
+}
+
+/// What was read from the answer with another bug in place, without that bug: its numbers are others than those that are
+/// read without it.
+fn alone_as_in(
+    judge: &Judge<'_>,
+    fit: Fit,
+    both: &Model,
+    (first, single): (&Single, &Single),
+    wrong: Fields,
+) -> Single {
+    let model = fit.alone(both);
+    let same = model.sums == single.model.sums && model.signs == single.model.signs;
+    let agreement = if same {
+        single.agreement.clone()
+    } else if judge.plausible(&model, wrong).is_empty() {
+        Agreement::none()
+    } else {
+        judge.agreement(&model)
+    };
+    // Of the fields that it may change, those that it does.
+    let affects = match fit {
+        Fit::Sums => differing(judge, &judge.probe(&first.model), &judge.probe(both)),
+        _ => single.affects,
+    };
+    Single { cause: single.cause, model, agreement, affects }
+}
+
 /// Those that contradict the fewest fields, one per set of names: that with the smallest error.
-fn simplest(mut explanations: Vec<Explanation>) -> Vec<Explanation> {
+fn simplest(judge: &Judge<'_>, mut explanations: Vec<Explanation>) -> Vec<Explanation> {
     let least = explanations.iter().map(|e| e.contradicted).min().unwrap_or(0);
     explanations.retain(|e| e.contradicted == least);
-    explanations.sort_by(|a, b| a.residual.total_cmp(&b.residual));
+    // Differences far below the tolerance are rounding: then the order of the catalogue holds.
+    let rounded = |e: &Explanation| (e.residual / judge.tolerance * 1e3).round() as u64;
+    explanations.sort_by_key(rounded);
     let mut seen: Vec<Vec<&'static str>> = Vec::new();
     explanations.retain(|e| {
         let kinds = e.kinds();

@@ -7,12 +7,16 @@ use skinsplat_core::math::Matrix3;
 pub(crate) struct Wiring {
     pub(crate) angles: Angles,
     pub(crate) frames: Frames,
-    pub(crate) bind_is_missing: bool,
+    /// Of the joints, relative to their parents.
+    pub(crate) locals: Reading,
+    pub(crate) chain_is_reversed: bool,
+    pub(crate) bind: Bind,
+    pub(crate) translation: Translation,
     pub(crate) joint_matrices: JointMatrices,
-    pub(crate) joint_quaternions: Order,
+    pub(crate) joint_quaternions: Reading,
     pub(crate) influences: Influences,
     pub(crate) keeps_sum: bool,
-    pub(crate) canonical: Order,
+    pub(crate) canonical: Reading,
     pub(crate) blend: Blend,
     pub(crate) unit: Unit,
     pub(crate) relative_is_inverted: bool,
@@ -26,12 +30,24 @@ pub(crate) struct Wiring {
     /// From the Gaussian to the camera.
     pub(crate) direction_is_reversed: bool,
     pub(crate) basis: Basis,
+    /// Where SH are turned, which is to be seen only in another basis.
+    pub(crate) basis_space: Space,
     pub(crate) mirror: Option<usize>,
     pub(crate) axes: Axes,
     pub(crate) order: Order,
     pub(crate) units: Option<f64>,
     pub(crate) opacity: Activation,
     pub(crate) layout: ShLayout,
+}
+
+/// In whose axes and units a stage is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Space {
+    /// Those of the vectors.
+    #[default]
+    Vectors,
+    /// Those of PLY, body and poses, whatever the vectors are in.
+    Files,
 }
 
 /// How pose angles are read.
@@ -56,6 +72,32 @@ pub(crate) enum Frames {
     LateHeld,
     /// The one before; at first the last.
     LateAround,
+    /// The next; at last the last.
+    EarlyHeld,
+    /// The next; at last the first.
+    EarlyAround,
+}
+
+/// What becomes of the inverse bind matrices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Bind {
+    /// World matrix times inverse bind matrix.
+    #[default]
+    Right,
+    Missing,
+    /// Inverse bind matrix times world matrix.
+    OtherSide,
+}
+
+/// What becomes of the translation of a pose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Translation {
+    /// Added after skinning.
+    #[default]
+    Right,
+    Missing,
+    /// Added before: the joints turn it.
+    Before,
 }
 
 /// What is done to the joints' matrices.
@@ -96,6 +138,16 @@ impl Order {
     }
 }
 
+/// How quaternions of an input are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Reading {
+    #[default]
+    Right,
+    Conjugated,
+    /// With w at the other end, in the axes of a file.
+    Misordered(Order, Space),
+}
+
 /// Which weights count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Influences {
@@ -119,7 +171,9 @@ pub(crate) enum Signs {
     /// w at least 0.
     NonNegativeW,
     /// The component of largest magnitude positive.
-    LargestPositive,
+    LargestPositive(Space),
+    /// As the usual routine reads them from matrices: w positive where the trace is, else the largest other component.
+    FromMatrices(Space),
     /// As products of the local rotations along the chain.
     Chained,
 }
@@ -133,6 +187,15 @@ pub(crate) enum Conversion {
     TraceFirst,
     /// Four square roots, signs from the off-diagonal differences.
     FourRoots,
+}
+
+/// How a matrix is made orthonormal: which axes, one after the other; the third follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct GramSchmidt {
+    pub(crate) rows: bool,
+    pub(crate) first: usize,
+    pub(crate) second: usize,
+    pub(crate) of: Of,
 }
 
 /// What the quaternion is read from.
@@ -159,8 +222,7 @@ pub(crate) enum Blend {
     Average,
     Power(u32, From),
     Sum(Signs),
-    GramSchmidtColumns(Of),
-    GramSchmidtRows(Of),
+    GramSchmidt(GramSchmidt),
     Converted(Conversion, Of),
     Dual(Signs),
 }
@@ -172,8 +234,10 @@ pub(crate) enum Unit {
     Normalised,
     /// The sum as it is; the covariance from the normalised one.
     Raw,
-    /// The sum as it is, in the matrix of the covariance too.
+    /// The sum as it is, in the matrix (1 - 2 (y² + z²), …) of covariances and directions too.
     RawMatrix,
+    /// The sum as it is, in covariances and directions as q v q*, which scales by |q|².
+    RawProduct,
 }
 
 /// How canonical and relative rotation are combined.
@@ -195,15 +259,15 @@ pub(crate) enum Scale {
     #[default]
     Right,
     /// One unit along each axis.
-    Ones,
+    Ones(Space),
     /// Balls of the geometric mean.
     GeometricBall,
     /// Balls of the arithmetic mean.
     ArithmeticBall,
     /// Activated twice: exp of what is a standard deviation already.
-    Twice,
+    Twice(Space),
     /// Not activated: the logarithm where a standard deviation belongs.
-    Never,
+    Never(Space),
 }
 
 /// How the covariance is made.
@@ -214,7 +278,7 @@ pub(crate) enum Covariance {
     /// B Σ_c Bᵀ with the blended matrix as it is.
     Blended,
     /// R S Rᵀ: standard deviations in place of variances.
-    NotSquared,
+    NotSquared(Space),
 }
 
 /// Whether SH or view directions are turned.
@@ -300,4 +364,6 @@ pub(crate) enum ShLayout {
     Interleaved,
     /// m from l down to -l.
     OrdersReversed,
+    /// B G R, in all bands.
+    Bgr,
 }

@@ -3,7 +3,7 @@
 
 mod engine;
 
-use engine::{FIELDS, Inputs, Outs, binary, json_of, ply, skin};
+use engine::{FIELDS, Inputs, Outs, binary, halved, json_of, ply, skin};
 use skinsplat_conform::{Cases, Convention, Error, Options, Report, Verdict, check, export};
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -72,7 +72,7 @@ fn a_right_engine_conforms() {
 }
 
 /// What is planted, and the names that it has to be given.
-const SINGLES: [(&str, &[&str]); 31] = [
+const SINGLES: [(&str, &[&str]); 45] = [
     ("transposed-joints", &["row-major-matrices", "transposed"]),
     ("row-major-matrices", &["row-major-matrices"]),
     ("relative-conjugated", &["conjugated", "transposed"]),
@@ -104,6 +104,20 @@ const SINGLES: [(&str, &[&str]); 31] = [
     ("scale-ignored", &["scale-ignored"]),
     ("scale-ball", &["scale-ignored"]),
     ("one-frame-late", &["one-frame-late"]),
+    ("one-frame-early", &["one-frame-early"]),
+    ("local-conjugated", &["conjugated", "transposed"]),
+    ("local-xyzw", &["xyzw-for-wxyz"]),
+    ("local-wxyz", &["xyzw-for-wxyz"]),
+    ("chain-reversed", &["chain-reversed"]),
+    ("bind-on-other-side", &["bind-pose-on-other-side"]),
+    ("translation-missing", &["translation-missing"]),
+    ("translation-before", &["translation-before-skinning"]),
+    ("canonical-conjugated", &["conjugated", "transposed"]),
+    ("signs-from-matrices", &["signs-not-aligned"]),
+    ("gram-schmidt-z-first", &["gram-schmidt"]),
+    ("gram-schmidt-rows", &["gram-schmidt"]),
+    ("gram-schmidt-rows-z-first", &["gram-schmidt"]),
+    ("bgr-for-rgb", &["bgr-for-rgb"]),
 ];
 
 #[test]
@@ -170,7 +184,7 @@ fn what_is_known_of_a_bug_is_said() {
 }
 
 /// Two bugs at once, and both names.
-const PAIRS: [([&str; 2], &[&str]); 15] = [
+const PAIRS: [([&str; 2], &[&str]); 19] = [
     (["xyzw-for-wxyz", "sh-not-turned"], &["sh-not-turned", "xyzw-for-wxyz"]),
     (["signs-not-aligned", "sh-not-turned"], &["sh-not-turned", "signs-not-aligned"]),
     (["dual-quaternions", "weights-cut-to-four"], &["dual-quaternions", "weights-cut-to-four"]),
@@ -186,6 +200,10 @@ const PAIRS: [([&str; 2], &[&str]); 15] = [
         ["weights-cut-not-normalised", "xyzw-for-wxyz"],
         &["weights-cut-to-four", "weights-not-normalised", "xyzw-for-wxyz"],
     ),
+    (["mirrored-shape", "weights-eleven-tenths"], &["mirrored-handedness", "weights-not-normalised"]),
+    (["y-up-for-z-up", "weights-eleven-tenths"], &["weights-not-normalised", "y-up-for-z-up"]),
+    (["translation-missing", "sh-not-turned"], &["sh-not-turned", "translation-missing"]),
+    (["sh-backwards-and-not", "scale-ignored"], &["scale-ignored", "sh-not-turned", "sh-turned-backwards"]),
     (["not-normalised", "weights-quantised"], &["not-normalised", "weights-quantised"]),
     (["direction-reversed", "sh-not-turned"], &["direction-reversed", "sh-not-turned"]),
     (["sh-basis-sign-out", "signs-not-aligned"], &["sh-basis-sign", "signs-not-aligned"]),
@@ -209,6 +227,165 @@ fn pairs_of_bugs_are_named() {
     }
     let cut = of_json(&skin(&bench().inputs, &["weights-cut-not-normalised"]));
     expect(&cut, &["weights-cut-to-four", "weights-not-normalised"], "cut");
+}
+
+/// A rig in another convention, and the kinds of an engine with these bugs, which computes in its axes.
+fn named_in(convention: &str, plants: &[&[&str]]) -> Vec<(Report, String)> {
+    let folder = tempfile::tempdir().unwrap();
+    export(folder.path(), Cases::Small, &convention.parse().unwrap()).unwrap();
+    let inputs = Inputs::of(folder.path());
+    let xyzw = std::fs::read_to_string(folder.path().join("vectors.json")).unwrap().contains("\"xyzw\"");
+    let file = folder.path().join("answer.json");
+    let named = |bugs: &&[&str]| {
+        let mut outs = skin(&inputs, bugs);
+        for o in outs.iter_mut().flatten().filter(|_| xyzw) {
+            o.quat = [o.quat[1], o.quat[2], o.quat[3], o.quat[0]];
+        }
+        std::fs::write(&file, json_of(&outs, &FIELDS)).unwrap();
+        let report = check(folder.path(), &file, &Options::default()).unwrap();
+        (report, format!("{convention}: {bugs:?}"))
+    };
+    plants.iter().map(named).collect()
+}
+
+/// Bugs of stages that depend on axes and units are those of the axes that the vectors are in.
+#[test]
+fn bugs_are_named_in_the_axes_of_the_vectors() {
+    const PLANTS: [(&[&str], &[&str]); 17] = [
+        (&["joints-xyzw"], &["xyzw-for-wxyz"]),
+        (&["canonical-xyzw"], &["xyzw-for-wxyz"]),
+        (&["local-xyzw"], &["xyzw-for-wxyz"]),
+        (&["local-wxyz"], &["xyzw-for-wxyz"]),
+        (&["local-conjugated"], &["conjugated", "transposed"]),
+        (&["canonical-conjugated"], &["conjugated", "transposed"]),
+        (&["gram-schmidt"], &["gram-schmidt"]),
+        (&["gram-schmidt-z-first"], &["gram-schmidt"]),
+        (&["gram-schmidt-y-z"], &["gram-schmidt"]),
+        (&["gram-schmidt-rows"], &["gram-schmidt"]),
+        (&["gram-schmidt", "sh-not-turned"], &["gram-schmidt", "sh-not-turned"]),
+        (&["signs-from-matrices"], &["signs-not-aligned"]),
+        (&["scale-ignored"], &["scale-ignored"]),
+        (&["scale-not-activated"], &["scale-not-activated"]),
+        (&["activated-scale"], &["activated-scale"]),
+        (&["sh-basis-sign-while"], &["sh-basis-sign"]),
+        (&["bgr-for-rgb", "one-frame-early"], &["bgr-for-rgb", "one-frame-early"]),
+    ];
+    for convention in ["unity", "unity,wxyz", "unreal", "opencv"] {
+        let named = named_in(convention, &PLANTS.map(|(bugs, _)| bugs));
+        for ((report, what), (bugs, expected)) in named.iter().zip(PLANTS) {
+            expect(report, expected, what);
+            let said = &report.explanations[0];
+            match bugs {
+                ["sh-basis-sign-while"] => {
+                    assert_eq!(
+                        said["coefficients"],
+                        serde_json::json!([1, 3, 5, 7, 9, 11, 13, 15]),
+                        "{what}"
+                    );
+                }
+                ["gram-schmidt"] => assert_eq!(said["axes"], "x, then y", "{what}"),
+                ["gram-schmidt-z-first"] => assert_eq!(said["axes"], "z, then y", "{what}"),
+                ["joints-xyzw"] => {
+                    assert_eq!(said["in_axes_of"], report.convention.split(',').next().unwrap())
+                }
+                _ => {}
+            }
+        }
+        let right = named_in(convention, &[&[]]);
+        assert_eq!(right[0].0.verdict, Verdict::Conforms, "{}", right[0].0.text());
+    }
+}
+
+#[test]
+fn what_is_not_normalised_is_named_in_what_is_made_of_it() {
+    let outs = skin(&bench().inputs, &["not-normalised-anywhere"]);
+    let fields = ["means", "quaternions", "covariances", "directions"];
+    let report = of_text(json_of(&outs, &fields)).unwrap();
+    expect(&report, &["not-normalised"], "everywhere");
+    let wrong = serde_json::json!(["quaternions", "covariances", "directions"]);
+    assert_eq!(report.explanations[0]["fields"], wrong);
+}
+
+#[test]
+fn bands_turned_backwards_and_not_are_two_bugs() {
+    let report = of_json(&skin(&bench().inputs, &["sh-backwards-and-not"]));
+    expect(&report, &["sh-not-turned", "sh-turned-backwards"], "bands");
+    assert_eq!(report.alternatives, 1, "{}", report.text());
+    // What another bug makes of the sums of weights is not said of fields that agree without it.
+    let report = of_json(&skin(&bench().inputs, &["mirrored-shape", "weights-eleven-tenths"]));
+    let sums = report.explanations.iter().find(|e| e["kind"] == "weights-not-normalised").unwrap();
+    assert_eq!(sums["fields"], serde_json::json!(["means", "directions"]), "{}", report.text());
+}
+
+#[test]
+fn half_floats_are_told_from_bugs() {
+    let right = halved(&skin(&bench().inputs, &[]));
+    for report in [of_json(&right), of_text(binary(&right, "")).unwrap()] {
+        expect(&report, &["half-precision"], "half");
+        let said = &report.explanations[0];
+        assert!((said["read"].as_f64().unwrap() - said["expected"].as_f64().unwrap()).abs() < 1e-3, "{said}");
+    }
+    let wrong = halved(&skin(&bench().inputs, &["gram-schmidt"]));
+    expect(&of_json(&wrong), &["gram-schmidt", "half-precision"], "half and more");
+    // Rounded to something else.
+    let mut coarse = skin(&bench().inputs, &[]);
+    coarse.iter_mut().flatten().for_each(|o| o.mean = o.mean.map(|v| (v * 1000.0).round() / 1000.0));
+    expect(&of_json(&coarse), &["unknown"], "millimetres");
+}
+
+#[test]
+fn power_steps_say_how_far_off_they_are() {
+    let report = of_json(&skin(&bench().inputs, &["power-15"]));
+    expect(&report, &["too-few-power-steps"], "the paper's");
+    let degrees = report.explanations[0]["degrees_off"].as_f64().unwrap();
+    assert!((0.1..2.0).contains(&degrees) && report.text().contains("paper"), "{}", report.text());
+}
+
+/// Which pose is meant is obeyed where the answer does not say, and refused where it says otherwise.
+#[test]
+fn a_pose_that_is_named_is_obeyed_or_refused() {
+    let outs = skin(&bench().inputs, &[]);
+    let one = vec![outs[3].clone()];
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let with = |bytes: Vec<u8>, frame: usize| {
+        std::fs::write(file.path(), bytes).unwrap();
+        let options = Options { frame: Some(frame), ..Options::default() };
+        check(bench().folder.path(), file.path(), &options)
+    };
+    let said = json_of(&one, &FIELDS).replacen('{', "{\"frame\": 3,", 1);
+    for bytes in [json_of(&one, &FIELDS).into_bytes(), binary(&one, "")] {
+        assert_eq!(with(bytes.clone(), 3).unwrap().verdict, Verdict::Conforms);
+        let report = with(bytes, 2).unwrap();
+        assert_eq!((report.verdict, report.poses), (Verdict::Differs, vec![2]));
+    }
+    assert_eq!(with(said.clone().into_bytes(), 3).unwrap().verdict, Verdict::Conforms);
+    for bytes in [said.into_bytes(), json_of(&outs, &FIELDS).into_bytes(), binary(&outs, "")] {
+        let error = with(bytes, 2).map(|report| report.text()).unwrap_err().to_string();
+        assert!(error.contains("--frame: 2") && error.contains("itself") && !error.contains('\n'), "{error}");
+    }
+    let options = Options { frame: Some(2), ..Options::default() };
+    let expected = bench().folder.path().join("expected");
+    let error = check(bench().folder.path(), &expected, &options).unwrap_err().to_string();
+    assert!(error.contains("--frame: 2") && error.contains("6 PLY files"), "{error}");
+}
+
+#[test]
+fn infinite_numbers_of_a_ply_are_refused() {
+    for (what, parts) in [("scale", ["scale_0", "-inf"]), ("opacity", ["opacity", "inf"])] {
+        let mut outs = skin(&bench().inputs, &[]);
+        match what {
+            "scale" => outs[1][7].scale[0] = 0.0,
+            _ => outs[1][7].opacity = 1.0,
+        }
+        let folder = tempfile::tempdir().unwrap();
+        ply(&outs, folder.path(), &[]);
+        let error = judged(folder.path().to_owned()).map(|report| report.text()).unwrap_err().to_string();
+        assert!(
+            parts.iter().all(|part| error.contains(part)) && error.contains("001.ply: vertex 7"),
+            "{error}"
+        );
+        assert!(!error.contains('\n'), "{error}");
+    }
 }
 
 #[test]
@@ -289,7 +466,34 @@ fn bad_answers_are_one_line() {
         value["means"][1][2][0] = serde_json::Value::Null;
         value.to_string()
     };
+    let mut flagged = whole.clone();
+    flagged[32] = 1;
+    let twice = {
+        let mut bytes = whole.clone();
+        bytes.copy_within(40..40 + 64, 40 + 64);
+        bytes
+    };
+    let more = [whole.as_slice(), &[0; 8]].concat();
+    let report = of_text(more).unwrap();
+    assert!(
+        report.notes.iter().any(|note| note.contains("8 byte(s) after the last block")),
+        "{:?}",
+        report.notes
+    );
     let cases: Vec<(&str, Vec<u8>, &[&str])> = vec![
+        ("empty", Vec::new(), &["an empty file", "PLY"]),
+        ("flagged", flagged, &["quaternions xyzw", "wxyz, as declared"]),
+        ("a block twice", twice, &["means: given twice", "one block"]),
+        (
+            "a name twice",
+            text.replacen('{', "{\"means\": [],", 1).into(),
+            &["means: given twice", "every name once"],
+        ),
+        (
+            "frame and frames",
+            text.replacen('{', "{\"frame\": 3, \"frames\": [3],", 1).into(),
+            &["frame: 3, beside `frames`", "one of"],
+        ),
         ("fewer", json_of(&fewer, &FIELDS).into(), &["53 Gaussians", "54 Gaussians"]),
         ("swapped", json_of(&swapped, &FIELDS).into(), &["order", "Gaussian 20", "2 of 54"]),
         ("a pose short", json_of(&outs[1..].to_vec(), &FIELDS).into(), &["5 poses", "6 poses"]),
@@ -304,7 +508,7 @@ fn bad_answers_are_one_line() {
         (
             "unknown convention",
             text.replacen('{', "{\"convention\": \"blender\",", 1).into(),
-            &["blender", "unity"],
+            &["convention: `blender`", "unity"],
         ),
         (
             "a pose too far",

@@ -62,11 +62,16 @@ fn text_at(bytes: &[u8], at: usize, width: usize) -> String {
 /// Reads an answer.
 pub(super) fn read(bytes: &[u8], expected: &Expected) -> Result<Answer, Error> {
     let (declared, blocks) = table(bytes)?;
+    let ends = blocks.iter().map(|block| block.offset.saturating_add(block.length));
+    let end = ends.fold((HEADER + BLOCK * blocks.len()) as u64, u64::max);
     let mut arrays = Vec::new();
     let mut frames = None;
     let mut unread = Vec::new();
     for block in blocks {
         if layout::is_field(&block.name) {
+            if arrays.iter().any(|array: &Array| array.name == block.name) {
+                return Err(Error::new(block.name, "given twice", "one block of a name"));
+            }
             arrays.push(Array { values: numbers(bytes, &block)?, name: block.name, shape: block.shape });
         } else if block.name == "frames" {
             frames = Some(numbers(bytes, &block)?.iter().map(|&v| v as usize).collect());
@@ -76,6 +81,9 @@ pub(super) fn read(bytes: &[u8], expected: &Expected) -> Result<Answer, Error> {
     }
     let mut answer = layout::answer(arrays, frames, expected)?;
     answer.declared = declared;
+    if let Some(more) = (bytes.len() as u64).checked_sub(end).filter(|&more| more > 0) {
+        answer.notes.push(format!("not read: {more} byte(s) after the last block"));
+    }
     if !unread.is_empty() {
         answer.notes.push(format!("not read: {}", unread.join(", ")));
     }
@@ -106,7 +114,9 @@ fn table(bytes: &[u8]) -> Result<(Option<Declared>, Vec<Block>), Error> {
         1 => QuaternionOrder::Xyzw,
         other => return Err(Error::new("header", format!("order of quaternions {other}"), "0 or 1")),
     };
-    let declared = (!name.is_empty()).then_some(Declared { name, quaternions: Some(quaternions) });
+    // Zeros may just not have been written; another order is said even where no name is.
+    let says = !name.is_empty() || quaternions == QuaternionOrder::Xyzw;
+    let declared = says.then_some(Declared { name, quaternions: Some(quaternions) });
     let blocks = (0..count as usize).map(|k| block(bytes, HEADER + BLOCK * k)).collect::<Result<_, _>>()?;
     Ok((declared, blocks))
 }

@@ -4,21 +4,60 @@ use super::super::Error;
 use super::super::convention::QuaternionOrder;
 use super::layout::{self, Array};
 use super::{Answer, Declared, Expected};
+use serde::Deserialize;
+use serde::de::{Deserializer, MapAccess, Visitor};
 use serde_json::{Map, Value};
 
 const EXPECTED: &str = "a JSON object with arrays such as means and quaternions (README.md of the rig)";
 
+/// The entries of an object, those of the same name too.
+struct Document(Vec<(String, Value)>);
+
+impl<'de> Deserialize<'de> for Document {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Entries;
+        impl<'de> Visitor<'de> for Entries {
+            type Value = Document;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Document, A::Error> {
+                let mut entries = Vec::new();
+                while let Some(entry) = map.next_entry()? {
+                    entries.push(entry);
+                }
+                Ok(Document(entries))
+            }
+        }
+        deserializer.deserialize_map(Entries)
+    }
+}
+
+impl Document {
+    /// Refuses names that are given twice: which of them holds is anybody's guess.
+    fn once(self) -> Result<Map<String, Value>, Error> {
+        let mut map = Map::new();
+        for (name, value) in self.0 {
+            let place: String = name.chars().take(40).collect();
+            if map.insert(name, value).is_some() {
+                return Err(Error::new(place, "given twice", "every name once"));
+            }
+        }
+        Ok(map)
+    }
+}
+
 /// Reads an answer.
 pub(super) fn read(bytes: &[u8], expected: &Expected) -> Result<Answer, Error> {
     let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    let value: Value = serde_json::from_slice(text).map_err(|cause| {
+    let document: Document = serde_json::from_slice(text).map_err(|cause| {
         let odd = ["NaN", "Infinity", "nan", "inf"].into_iter().find(|word| holds(text, word));
         let hint = odd.map_or(String::new(), |word| format!(" ({word} is no JSON number)"));
         Error::new("JSON", format!("{cause}{hint}"), EXPECTED)
     })?;
-    let Value::Object(document) = value else {
-        return Err(Error::new("JSON", "an array", EXPECTED));
-    };
+    let document = document.once()?;
     let mut arrays = Vec::new();
     let mut unread = Vec::new();
     for (name, value) in &document {
@@ -101,6 +140,10 @@ fn frames(document: &Map<String, Value>) -> Result<Option<Vec<usize>>, Error> {
         let shown: String = value.to_string().chars().take(40).collect();
         Error::new(field, shown, "indices of poses, from 0")
     };
+    if let (Some(frame), Some(_)) = (document.get("frame"), document.get("frames")) {
+        let shown: String = frame.to_string().chars().take(40).collect();
+        return Err(Error::new("frame", format!("{shown}, beside `frames`"), "one of frame and frames"));
+    }
     if let Some(value) = document.get("frame") {
         return index(value).map(|frame| Some(vec![frame])).ok_or_else(|| wrong("frame", value));
     }
@@ -115,7 +158,8 @@ fn declared(document: &Map<String, Value>) -> Result<Option<Declared>, Error> {
     let wrong =
         || Error::new("convention", value.to_string(), "a name, or an object with name and quaternions");
     if let Some(text) = value.as_str() {
-        let convention: super::Convention = text.parse()?;
+        let convention: super::Convention =
+            text.parse().map_err(|e| Error { place: "convention".to_owned(), ..e })?;
         let mut words = text.split(',').map(str::trim);
         let says_order = words.any(|word| word == "wxyz" || word == "xyzw");
         let quaternions = says_order.then_some(convention.quaternions);

@@ -40,11 +40,13 @@ pub(super) fn answer(
 ) -> Result<Answer, Error> {
     let frames = checked_frames(frames, expected)?;
     let poses = frames.as_ref().map_or_else(|| poses_of(&arrays, expected), Vec::len);
+    let frames = expected.poses_of(frames, poses)?;
     let mut answer = Answer {
         storage: Storage::Activated,
-        frames: frames.or_else(|| (poses == expected.poses).then(|| (0..poses).collect())),
+        frames,
         present: Fields::default(),
         samples: blank(poses, expected.gaussians),
+        halves: Fields::default(),
         declared: None,
         notes: Vec::new(),
     };

@@ -10,7 +10,7 @@ pub(crate) use binary::{BLOCK, Block, HEADER, MAGIC, VERSION, dtype};
 use super::convention::{Convention, QuaternionOrder};
 use super::rig::Rig;
 use super::sample::{Field, Fields, Sample, Storage, range};
-use super::{Error, rig};
+use super::{Error, half_floats, rig};
 use std::path::Path;
 
 /// What an engine made of the rig.
@@ -24,6 +24,8 @@ pub struct Answer {
     pub(crate) present: Fields,
     /// Pose after pose, Gaussian after Gaussian. Numbers of absent fields are 0.
     pub(crate) samples: Vec<Sample>,
+    /// Fields whose every number a half float holds.
+    pub(crate) halves: Fields,
     /// The convention that the file itself declares, if it does.
     pub(crate) declared: Option<Declared>,
     /// What has to be said of how it was read, a clause each.
@@ -41,22 +43,44 @@ pub(crate) struct Declared {
 pub(crate) struct Expected {
     pub(crate) gaussians: usize,
     pub(crate) poses: usize,
+    /// Which pose the answer is said to be of, outside of it.
+    pub(crate) frame: Option<usize>,
 }
 
 impl Expected {
-    fn of(rig: &Rig) -> Self {
-        Self { gaussians: rig.len(), poses: rig.poses.len() }
+    fn of(rig: &Rig, frame: Option<usize>) -> Self {
+        Self { gaussians: rig.len(), poses: rig.poses.len(), frame }
+    }
+
+    /// The poses of an answer of so many, some of which says which.
+    ///
+    /// # Errors
+    /// What was said outside of it contradicts.
+    fn poses_of(&self, said: Option<Vec<usize>>, poses: usize) -> Result<Option<Vec<usize>>, Error> {
+        let contradicted = |expected: String| match self.frame {
+            Some(frame) => Err(Error::new("--frame", format!("{frame}"), expected)),
+            None => Ok(()),
+        };
+        let said = said.or_else(|| (poses == self.poses).then(|| (0..poses).collect()));
+        match (&said, self.frame) {
+            (Some(said), Some(frame)) if said.len() > 1 || said.first() != Some(&frame) => {
+                let list: Vec<String> = said.iter().map(usize::to_string).collect();
+                contradicted(format!("what the answer says itself, pose(s) {}", list.join(", ")))?;
+            }
+            _ => {}
+        }
+        Ok(said.or(self.frame.map(|frame| vec![frame])))
     }
 }
 
 impl Answer {
     /// Reads an answer, told apart by content: a folder of PLY files or one of them, JSON, or flat binary. `frame` says which
-    /// pose a single PLY is.
+    /// pose it is of, where it does not say so itself.
     ///
     /// # Errors
     /// Another format, another number of Gaussians or poses, NaN, half floats, no field at all.
     pub fn read(path: &Path, rig: &Rig, frame: Option<usize>) -> Result<Self, Error> {
-        let expected = Expected::of(rig);
+        let expected = Expected::of(rig, frame);
         if let Some(frame) = frame.filter(|&frame| frame >= expected.poses) {
             let problem = format!("{frame}");
             return Err(Error::new("--frame", problem, format!("a pose below {}", expected.poses)));
@@ -67,11 +91,13 @@ impl Answer {
             let what = "a posed PLY, a JSON answer or a flat binary answer (README.md of the rig says how)";
             let bytes = skinsplat_data::error::read_bytes(path, "answer", what)?;
             if bytes.starts_with(b"ply") {
-                ply::single(path, &expected, frame)?
+                ply::single(path, &expected)?
             } else if bytes.starts_with(MAGIC) {
                 binary::read(&bytes, &expected).map_err(|e| e.within(path))?
             } else if bytes.trim_ascii_start().first().is_some_and(|b| b"{[\xEF".contains(b)) {
                 json::read(&bytes, &expected).map_err(|e| e.within(path))?
+            } else if bytes.is_empty() {
+                return Err(Error::new(format!("{}: answer", path.display()), "an empty file", what));
             } else {
                 let start: String = bytes.iter().take(8).map(|b| format!("{b:02x}")).collect();
                 let problem = format!("unknown format, {} bytes that begin with {start}", bytes.len());
@@ -81,7 +107,7 @@ impl Answer {
         answer.checked(path)
     }
 
-    fn checked(self, path: &Path) -> Result<Self, Error> {
+    fn checked(mut self, path: &Path) -> Result<Self, Error> {
         if self.present.is_empty() {
             let names = "means, quaternions, scales, covariances, directions, opacities or sh";
             return Err(Error::new(
@@ -90,6 +116,10 @@ impl Answer {
                 format!("at least one of {names}"),
             ));
         }
+        let samples = &self.samples;
+        let held =
+            |field: &Field| samples.iter().all(|s| s[range(*field)].iter().all(|&v| half_floats::holds(v)));
+        self.halves = self.present.iter().filter(held).collect();
         Ok(self)
     }
 
@@ -104,19 +134,24 @@ impl Answer {
     /// The file declares another.
     pub(crate) fn agrees_with(&self, convention: &Convention, path: &Path) -> Result<(), Error> {
         let Some(declared) = &self.declared else { return Ok(()) };
-        let other_name = declared.name != convention.name;
+        let other_name = !declared.name.is_empty() && declared.name != convention.name;
         let other_order = declared.quaternions.is_some_and(|order| order != convention.quaternions);
         if !other_name && !other_order {
             return Ok(());
         }
-        let order = declared.quaternions.map_or(String::new(), |order| format!(" with {}", order.name()));
+        let order = declared.quaternions.map_or("", QuaternionOrder::name);
         let expected = format!(
             "{} with {}, as declared (--convention changes that)",
             convention.name,
             convention.quaternions.name()
         );
         let name: String = declared.name.chars().take(40).collect();
-        Err(Error::new(format!("{}: convention", path.display()), format!("{name}{order}"), expected))
+        let problem = match (name.as_str(), order) {
+            ("", order) => format!("quaternions {order}"),
+            (name, "") => name.to_owned(),
+            (name, order) => format!("{name} with {order}"),
+        };
+        Err(Error::new(format!("{}: convention", path.display()), problem, expected))
     }
 }
 

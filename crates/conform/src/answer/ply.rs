@@ -8,14 +8,14 @@ use skinsplat_core::scene::Gaussians;
 use skinsplat_data::ply::{self, Dialect};
 use std::path::{Path, PathBuf};
 
-/// One file; `frame` says which pose it is, else a number at the end of its name.
-pub(super) fn single(path: &Path, expected: &Expected, frame: Option<usize>) -> Result<Answer, Error> {
+/// One file; the caller says which pose it is, else a number at the end of its name.
+pub(super) fn single(path: &Path, expected: &Expected) -> Result<Answer, Error> {
     let mut answer = read(path, expected)?;
     let numbered = number(path).filter(|&n| n < expected.poses);
-    if let (None, Some(n)) = (frame, numbered) {
+    if let (None, Some(n)) = (expected.frame, numbered) {
         answer.notes.push(format!("taken for pose {n}, from its name"));
     }
-    answer.frames = frame.or(numbered).map(|frame| vec![frame]);
+    answer.frames = expected.frame.or(numbered).map(|frame| vec![frame]);
     Ok(answer)
 }
 
@@ -40,6 +40,12 @@ pub(super) fn folder(path: &Path, expected: &Expected) -> Result<Answer, Error> 
         frames = (0..files.len()).collect();
         notes.push("files are taken for poses 0, 1, … in the order of their names".to_owned());
     }
+    if let (true, Some(frame)) = (files.len() > 1, expected.frame) {
+        let expected =
+            format!("none with a folder of {} PLY files, whose names say their poses", files.len());
+        return Err(Error::new("--frame", frame.to_string(), expected).within(path));
+    }
+    frames = expected.frame.map_or(frames, |frame| vec![frame]);
     if files.len() > expected.poses {
         let problem = format!("{} PLY files", files.len());
         return Err(Error::new(place(), problem, format!("at most {} poses", expected.poses)));
@@ -49,6 +55,7 @@ pub(super) fn folder(path: &Path, expected: &Expected) -> Result<Answer, Error> 
         frames: Some(frames),
         present: Fields::default(),
         samples: Vec::new(),
+        halves: Fields::default(),
         declared: None,
         notes,
     };
@@ -78,11 +85,28 @@ fn read(path: &Path, expected: &Expected) -> Result<Answer, Error> {
         let problem = format!("{} Gaussians", gaussians.len());
         return Err(Error::new(place, problem, format!("{}, in the order of the rig", expected.gaussians)));
     }
+    finite(path, gaussians)?;
     let mut notes = stored.notes;
     if stored.dialect == Dialect::Compressed {
         notes.push("compressed: its numbers are rounded".to_owned());
     }
     Ok(answer(gaussians, notes))
+}
+
+/// Refuses infinite logarithms and logits, which readers of PLY take for what vanishes or is opaque: nothing in the rig is.
+fn finite(path: &Path, gaussians: &Gaussians) -> Result<(), Error> {
+    let scales = gaussians.log_scales.iter().enumerate().flat_map(|(i, v)| {
+        v.to_array().into_iter().enumerate().map(move |(k, v)| (i, format!("scale_{k}"), v))
+    });
+    let logits = gaussians.opacity_logits.iter().enumerate().map(|(i, &v)| (i, "opacity".to_owned(), v));
+    match scales.chain(logits).find(|(_, _, v)| !v.is_finite()) {
+        None => Ok(()),
+        Some((i, name, v)) => Err(Error::new(
+            format!("{}: vertex {i}: {name}", path.display()),
+            v.to_string(),
+            "a finite number",
+        )),
+    }
 }
 
 fn answer(gaussians: &Gaussians, notes: Vec<String>) -> Answer {
@@ -91,6 +115,7 @@ fn answer(gaussians: &Gaussians, notes: Vec<String>) -> Answer {
         frames: None,
         present: [Field::Means, Field::Quaternions, Field::Scales, Field::Opacities].into_iter().collect(),
         samples: blank(1, gaussians.len()),
+        halves: Fields::default(),
         declared: None,
         notes,
     };

@@ -1,7 +1,7 @@
 //! From the joints of a Gaussian to one rotation and one position.
 
-use super::super::wiring::{Blend, Conversion, From, Of, Signs, Unit, Wiring};
-use super::{Blended, JointState};
+use super::super::wiring::{Blend, Conversion, From, GramSchmidt, Of, Signs, Unit, Wiring};
+use super::{Blended, JointState, Pipeline};
 use skinsplat_core::math::average::{self, Solver, Start};
 use skinsplat_core::math::dual_quaternion::DualQuaternion;
 use skinsplat_core::math::rotation::{SignPolicy, conjugate, multiply, normalize};
@@ -9,6 +9,7 @@ use skinsplat_core::math::{Matrix3, dot4, matrix3, rotation};
 
 /// The blend of the joints of a Gaussian at `mean`; `weights` are its (joint, weight) pairs, the heaviest first.
 pub(super) fn blended(
+    pipeline: &Pipeline<'_>,
     wiring: &Wiring,
     joints: &JointState,
     weights: &[(usize, f64)],
@@ -35,7 +36,7 @@ pub(super) fn blended(
         Blend::Average if wiring.unit == Unit::Normalised => {
             blended.relative = exact(&quats, &only);
         }
-        Blend::Average => blended.relative = sum(joints, weights, &quats, Signs::Heaviest),
+        Blend::Average => blended.relative = sum(pipeline, joints, weights, &quats, Signs::Heaviest),
         Blend::Power(steps, from) => {
             let start = match from {
                 From::Heaviest => Start::Heaviest,
@@ -45,16 +46,16 @@ pub(super) fn blended(
             blended.relative = averaged(&quats, &only, Solver::Power { steps, start });
         }
         Blend::Sum(signs) => {
-            let sum = sum(joints, weights, &quats, signs);
+            let sum = sum(pipeline, joints, weights, &quats, signs);
             let unit = wiring.unit == Unit::Normalised;
             blended.relative = if unit { normalize(sum).unwrap_or(rotation::identity()) } else { sum };
         }
-        Blend::Dual(signs) => dual(joints, weights, &quats, signs, mean, &mut blended),
-        Blend::GramSchmidtColumns(of) => projected(of, canonical, &mut blended, |m| {
-            rotation::gram_schmidt_columns(m).map_or(rotation::identity(), rotation::matrix_to_quaternion)
-        }),
-        Blend::GramSchmidtRows(of) => projected(of, canonical, &mut blended, |m| {
-            rotation::gram_schmidt_rows(m).map_or(rotation::identity(), rotation::matrix_to_quaternion)
+        Blend::Dual(signs) => {
+            let signed = signed(pipeline, joints, weights, &quats, signs);
+            dual(joints, weights, &signed, mean, &mut blended);
+        }
+        Blend::GramSchmidt(way) => projected(way.of, canonical, &mut blended, |m| {
+            gram_schmidt(way, m).map_or(rotation::identity(), rotation::matrix_to_quaternion)
         }),
         Blend::Converted(conversion, of) => projected(of, canonical, &mut blended, |m| {
             let raw = converted(conversion, &m);
@@ -75,23 +76,43 @@ fn exact(quats: &[[f64; 4]], weights: &[f64]) -> [f64; 4] {
 }
 
 /// Σ w q with signs, not normalised.
-fn sum(joints: &JointState, weights: &[(usize, f64)], quats: &[[f64; 4]], signs: Signs) -> [f64; 4] {
+fn sum(
+    pipeline: &Pipeline<'_>,
+    joints: &JointState,
+    weights: &[(usize, f64)],
+    quats: &[[f64; 4]],
+    signs: Signs,
+) -> [f64; 4] {
     let mut sum = [0.0; 4];
-    for (q, (_, weight)) in signed(joints, weights, quats, signs).iter().zip(weights) {
+    for (q, (_, weight)) in signed(pipeline, joints, weights, quats, signs).iter().zip(weights) {
         (0..4).for_each(|k| sum[k] += weight * q[k]);
     }
     sum
 }
 
 /// The quaternions with the signs that they are summed with.
-fn signed(joints: &JointState, weights: &[(usize, f64)], quats: &[[f64; 4]], signs: Signs) -> Vec<[f64; 4]> {
+fn signed(
+    pipeline: &Pipeline<'_>,
+    joints: &JointState,
+    weights: &[(usize, f64)],
+    quats: &[[f64; 4]],
+    signs: Signs,
+) -> Vec<[f64; 4]> {
     let aligned = |q: [f64; 4], reference: [f64; 4]| SignPolicy::AlignToFirst.apply(q, reference);
     match signs {
         // The heaviest bone is the first that is stored.
         Signs::Heaviest => quats.iter().map(|&q| aligned(q, quats[0])).collect(),
         Signs::Given => quats.to_vec(),
         Signs::NonNegativeW => quats.iter().map(|&q| SignPolicy::NonNegativeW.apply(q, q)).collect(),
-        Signs::LargestPositive => quats.iter().map(|&q| SignPolicy::LargestPositive.apply(q, q)).collect(),
+        Signs::LargestPositive(space) => {
+            let axes = pipeline.space(space);
+            let positive = |q: [f64; 4]| SignPolicy::LargestPositive.apply(q, q);
+            quats.iter().map(|&q| axes.rotation_back(positive(axes.rotation(q)))).collect()
+        }
+        Signs::FromMatrices(space) => {
+            let axes = pipeline.space(space);
+            quats.iter().map(|&q| axes.rotation_back(from_matrix_signs(axes.rotation(q)))).collect()
+        }
         Signs::Chained => weights.iter().map(|(joint, _)| joints.chained[*joint]).collect(),
         Signs::Running => {
             let mut so_far = [0.0; 4];
@@ -105,17 +126,31 @@ fn signed(joints: &JointState, weights: &[(usize, f64)], quats: &[[f64; 4]], sig
     }
 }
 
+/// The sign that [`trace_first`] gives a unit quaternion: w positive where the trace 4 w² - 1 is, else the largest of the others.
+fn from_matrix_signs(q: [f64; 4]) -> [f64; 4] {
+    let [w, x, y, z] = q;
+    let pivot = if 4.0 * w * w > 1.0 {
+        w
+    } else if x.abs() > y.abs() && x.abs() > z.abs() {
+        x
+    } else if y.abs() > z.abs() {
+        y
+    } else {
+        z
+    };
+    if pivot < 0.0 { q.map(|c| -c) } else { q }
+}
+
 /// Dual-quaternion blending, of the position too.
 fn dual(
     joints: &JointState,
     weights: &[(usize, f64)],
-    quats: &[[f64; 4]],
-    signs: Signs,
+    signed: &[[f64; 4]],
     mean: [f64; 3],
     blended: &mut Blended,
 ) {
     let (mut real, mut dual) = ([0.0; 4], [0.0; 4]);
-    for (&q, &(joint, weight)) in signed(joints, weights, quats, signs).iter().zip(weights) {
+    for (&q, &(joint, weight)) in signed.iter().zip(weights) {
         let motion = DualQuaternion::new(q, joints.translation[joint]);
         for k in 0..4 {
             real[k] += weight * motion.real[k];
@@ -140,6 +175,18 @@ fn projected(of: Of, canonical: [f64; 4], blended: &mut Blended, read: impl Fn(M
             blended.relative = multiply(posed, conjugate(canonical));
         }
     }
+}
+
+/// Orthonormal in the order of its axes: the first keeps its direction, the second its half-plane, the third follows.
+fn gram_schmidt(way: GramSchmidt, m: Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let rows = if way.rows { m } else { matrix3::transpose(m) };
+    let third = 3 - way.first - way.second;
+    let [a, b, c] = rotation::gram_schmidt_rows([rows[way.first], rows[way.second], rows[third]])?;
+    let even = (way.first + 1) % 3 == way.second;
+    let mut made = [[0.0; 3]; 3];
+    (made[way.first], made[way.second]) = (a, b);
+    made[third] = if even { c } else { c.map(|v| -v) };
+    Some(if way.rows { made } else { matrix3::transpose(made) })
 }
 
 fn converted(conversion: Conversion, m: &Matrix3<f64>) -> [f64; 4] {

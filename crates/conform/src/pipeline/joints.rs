@@ -1,7 +1,8 @@
 //! Forward kinematics: from the angles of a pose to the motion of each joint relative to the rest pose.
 
 use super::super::rig::{Rig, RigPose, wxyz};
-use super::super::wiring::{Angles, Frames, JointMatrices, Wiring};
+use super::super::wiring::{Angles, Bind, Frames, JointMatrices, Translation, Wiring};
+use super::Pipeline;
 use glam::{DQuat, DVec3};
 use skinsplat_core::math::rotation::{conjugate, multiply};
 use skinsplat_core::math::{Matrix3, matrix3, portable, rotation};
@@ -23,12 +24,12 @@ pub(crate) struct JointState {
 
 impl JointState {
     /// Of a pose of the rig.
-    pub(crate) fn new(rig: &Rig, wiring: &Wiring, frame: usize) -> Self {
-        let (pose, number) = pose_of(rig, wiring.frames, frame);
-        let mut state = kinematics(rig, &pose, wiring);
+    pub(crate) fn new(pipeline: &Pipeline<'_>, wiring: &Wiring, frame: usize) -> Self {
+        let (pose, number) = pose_of(pipeline.rig, wiring.frames, frame);
+        let mut state = kinematics(pipeline, &pose, wiring);
         for (joint, q) in state.quaternion.iter_mut().enumerate() {
             let sign = Rig::sign(number, joint);
-            *q = wiring.joint_quaternions.misread(q.map(|c| c * sign));
+            *q = pipeline.read(wiring.joint_quaternions, q.map(|c| c * sign));
         }
         twist(&mut state, wiring.joint_matrices);
         state
@@ -38,26 +39,29 @@ impl JointState {
 /// The pose that is drawn when `frame` is asked for.
 fn pose_of(rig: &Rig, frames: Frames, frame: usize) -> (RigPose, usize) {
     let of = |k: usize| (rig.poses[k].clone(), k);
-    match (frames, frame.checked_sub(1)) {
-        (Frames::Own, _) => of(frame),
-        (_, Some(before)) => of(before),
-        (Frames::LateHeld, None) => of(0),
-        (Frames::LateAround, None) => of(rig.poses.len() - 1),
-        (Frames::LateFromRest, None) => {
+    let last = rig.poses.len() - 1;
+    let late = |first: usize| of(frame.checked_sub(1).unwrap_or(first));
+    match frames {
+        Frames::Own => of(frame),
+        Frames::LateHeld => late(0),
+        Frames::LateAround => late(last),
+        Frames::LateFromRest if frame > 0 => of(frame - 1),
+        Frames::LateFromRest => {
             let joints = rig.body.skeleton.num_joints();
-            let rest = RigPose { axis_angles: vec![DVec3::ZERO; joints], translation: DVec3::ZERO };
-            (rest, 0)
+            (RigPose { axis_angles: vec![DVec3::ZERO; joints], translation: DVec3::ZERO }, 0)
         }
+        Frames::EarlyHeld => of(usize::min(frame + 1, last)),
+        Frames::EarlyAround => of((frame + 1) % (last + 1)),
     }
 }
 
-fn kinematics(rig: &Rig, pose: &RigPose, wiring: &Wiring) -> JointState {
+fn kinematics(pipeline: &Pipeline<'_>, pose: &RigPose, wiring: &Wiring) -> JointState {
     let factor = match wiring.angles {
         Angles::Radians => 1.0,
         Angles::TakenForDegrees => std::f64::consts::PI / 180.0,
         Angles::HandedInDegrees => 180.0 / std::f64::consts::PI,
     };
-    let skeleton = &rig.body.skeleton;
+    let skeleton = &pipeline.rig.body.skeleton;
     let count = skeleton.num_joints();
     let mut turned = vec![DQuat::IDENTITY; count];
     let mut chained = vec![DQuat::IDENTITY; count];
@@ -65,9 +69,14 @@ fn kinematics(rig: &Rig, pose: &RigPose, wiring: &Wiring) -> JointState {
     // Parents come before children in this rig.
     for joint in 0..count {
         let local = portable::from_scaled_axis(pose.axis_angles[joint] * factor);
+        let [w, x, y, z] = pipeline.read(wiring.locals, wxyz(local));
+        let local = DQuat::from_xyzw(x, y, z, w);
         let offset = skeleton.rest_locals[joint].translation;
         (turned[joint], position[joint]) = match skeleton.parents[joint] {
             None => (local, offset),
+            Some(parent) if wiring.chain_is_reversed => {
+                (local * turned[parent], local * position[parent] + offset)
+            }
             Some(parent) => (turned[parent] * local, position[parent] + turned[parent] * offset),
         };
         chained[joint] = turned[joint];
@@ -76,8 +85,17 @@ fn kinematics(rig: &Rig, pose: &RigPose, wiring: &Wiring) -> JointState {
     let rows = |q: DQuat| rotation::quaternion_to_matrix(wxyz(q));
     let rest = |joint: usize| -skeleton.inverse_binds[joint].translation;
     let translation = |joint: usize| {
-        let from_rest = if wiring.bind_is_missing { DVec3::ZERO } else { turned[joint] * rest(joint) };
-        (position[joint] - from_rest + pose.translation).to_array()
+        let from_rest = match wiring.bind {
+            Bind::Right => turned[joint] * rest(joint),
+            Bind::Missing => DVec3::ZERO,
+            Bind::OtherSide => rest(joint),
+        };
+        let moved = match wiring.translation {
+            Translation::Right => pose.translation,
+            Translation::Missing => DVec3::ZERO,
+            Translation::Before => turned[joint] * pose.translation,
+        };
+        (position[joint] - from_rest + moved).to_array()
     };
     JointState {
         linear: turned.iter().map(|&q| rows(q)).collect(),

@@ -9,18 +9,29 @@ mod output;
 pub(crate) use colour::is_flipped;
 pub(crate) use joints::JointState;
 
-use super::convention::{Convention, upper};
+use super::convention::{CONVENTIONS, Convention, upper};
 use super::rig::Rig;
 use super::sample::{Field, Sample, Storage, WIDTH, range};
-use super::wiring::{Covariance, Influences, Scale, Unit, Wiring};
-use skinsplat_core::math::{Matrix3, matrix3, portable, rotation};
+use super::wiring::{Covariance, Influences, Reading, Scale, Space, Unit, Wiring};
+use skinsplat_core::math::{Matrix3, dot4, matrix3, portable, rotation};
 
 /// The rig, and how numbers are written down.
 #[derive(Clone, Copy)]
 pub(crate) struct Pipeline<'a> {
     pub(crate) rig: &'a Rig,
+    /// Of the answer.
     pub(crate) convention: Convention,
+    /// Of the vectors that an engine may start from.
+    pub(crate) vectors: Convention,
     pub(crate) storage: Storage,
+}
+
+/// What of a Gaussian is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    All,
+    /// All but the SH, which are 0.
+    WithoutColour,
 }
 
 /// The blend of a Gaussian's joints.
@@ -36,25 +47,52 @@ struct Blended {
 }
 
 impl Pipeline<'_> {
+    /// The axes and units of a file.
+    pub(crate) fn space(&self, space: Space) -> &Convention {
+        match space {
+            Space::Vectors => &self.vectors,
+            Space::Files => &CONVENTIONS[0],
+        }
+    }
+
+    /// A quaternion of an input as it is read.
+    fn read(&self, reading: Reading, q: [f64; 4]) -> [f64; 4] {
+        match reading {
+            Reading::Right => q,
+            Reading::Conjugated => rotation::conjugate(q),
+            Reading::Misordered(order, space) => {
+                let axes = self.space(space);
+                axes.rotation_back(order.misread(axes.rotation(q)))
+            }
+        }
+    }
+
     /// What every Gaussian is in a pose, in the order of the rig.
     pub(crate) fn frame(&self, wiring: &Wiring, frame: usize) -> Vec<Sample> {
-        let joints = JointState::new(self.rig, wiring, frame);
+        let joints = JointState::new(self, wiring, frame);
         (0..self.rig.len()).map(|i| self.gaussian(wiring, &joints, i)).collect()
     }
 
     /// One Gaussian in a pose.
     pub(crate) fn gaussian(&self, wiring: &Wiring, joints: &JointState, i: usize) -> Sample {
-        self.weighted(wiring, joints, i, 1.0)
+        self.weighted(wiring, joints, i, 1.0, Part::All)
     }
 
     /// One Gaussian in a pose, its weights multiplied by a factor.
-    pub(crate) fn weighted(&self, wiring: &Wiring, joints: &JointState, i: usize, factor: f64) -> Sample {
+    pub(crate) fn weighted(
+        &self,
+        wiring: &Wiring,
+        joints: &JointState,
+        i: usize,
+        factor: f64,
+        part: Part,
+    ) -> Sample {
         let mut weights = influences(wiring, &self.rig.influences[i]);
         weights.iter_mut().for_each(|(_, w)| *w *= factor);
         let mean = self.rig.gaussians.means[i].to_array().map(f64::from);
-        let canonical = wiring.canonical.misread(self.rig.gaussians.unit_rotation(i).map(f64::from));
+        let canonical = self.read(wiring.canonical, self.rig.gaussians.unit_rotation(i).map(f64::from));
         let canonical = rotation::normalize(canonical).unwrap_or(rotation::identity());
-        let mut blended = blend::blended(wiring, joints, &weights, mean, canonical);
+        let mut blended = blend::blended(self, wiring, joints, &weights, mean, canonical);
         if wiring.relative_is_inverted {
             blended.relative = rotation::conjugate(blended.relative);
             blended.posed = None;
@@ -65,9 +103,9 @@ impl Pipeline<'_> {
         sample[range(Field::Means)].copy_from_slice(&blended.mean);
         sample[range(Field::Quaternions)].copy_from_slice(&posed);
         sample[range(Field::Scales)].copy_from_slice(&scales);
-        let covariance = covariance(wiring, &blended.matrix, canonical, posed, scales);
+        let covariance = self.covariance(wiring, &blended.matrix, canonical, posed, scales);
         sample[range(Field::Covariances)].copy_from_slice(&covariance);
-        colour::write(wiring, self.rig, i, &blended, &mut sample);
+        colour::write(self, wiring, i, &blended, part, &mut sample);
         sample[range(Field::Opacities)][0] = f64::from(self.rig.gaussians.opacity_logits[i]);
         output::finish(self, wiring, &mut sample);
         sample
@@ -79,12 +117,40 @@ impl Pipeline<'_> {
         let s = logarithms.map(portable::exp);
         match wiring.scale {
             Scale::Right => s,
-            Scale::Ones => [1.0; 3],
+            Scale::Ones(space) => [1.0 / self.space(space).units; 3],
             Scale::GeometricBall => [portable::exp(logarithms.iter().sum::<f64>() / 3.0); 3],
             Scale::ArithmeticBall => [s.iter().sum::<f64>() / 3.0; 3],
-            Scale::Twice => s.map(portable::exp),
-            Scale::Never => logarithms,
+            Scale::Twice(space) => {
+                let units = self.space(space).units;
+                s.map(|s| portable::exp(s * units) / units)
+            }
+            Scale::Never(space) => {
+                let units = self.space(space).units;
+                logarithms.map(|l| (l + portable::ln(units)) / units)
+            }
         }
+    }
+
+    /// xx, xy, xz, yy, yz, zz of the posed covariance.
+    fn covariance(
+        &self,
+        wiring: &Wiring,
+        blend: &Matrix3<f64>,
+        canonical: [f64; 4],
+        posed: [f64; 4],
+        scales: [f64; 3],
+    ) -> [f64; 6] {
+        let r = match wiring.covariance {
+            Covariance::Blended => matrix3::multiply(*blend, rotation::quaternion_to_matrix(canonical)),
+            _ => of_length(wiring.unit, posed),
+        };
+        let power = |s: f64| match wiring.covariance {
+            Covariance::NotSquared(space) => s / self.space(space).units,
+            _ => s * s,
+        };
+        let scaled =
+            r.map(|row| [row[0] * power(scales[0]), row[1] * power(scales[1]), row[2] * power(scales[2])]);
+        upper(&matrix3::multiply(scaled, matrix3::transpose(r)))
     }
 }
 
@@ -119,21 +185,14 @@ fn posed_rotation(wiring: &Wiring, blended: &Blended, canonical: [f64; 4]) -> [f
     if wiring.posed_is_inverted { rotation::conjugate(posed) } else { posed }
 }
 
-/// xx, xy, xz, yy, yz, zz of the posed covariance.
-fn covariance(
-    wiring: &Wiring,
-    blend: &Matrix3<f64>,
-    canonical: [f64; 4],
-    posed: [f64; 4],
-    scales: [f64; 3],
-) -> [f64; 6] {
-    let r = match (wiring.covariance, wiring.unit) {
-        (Covariance::Blended, _) => matrix3::multiply(*blend, rotation::quaternion_to_matrix(canonical)),
-        (_, Unit::RawMatrix) => rotation::quaternion_to_matrix_raw(posed),
-        _ => rotation::quaternion_to_matrix(posed),
-    };
-    let power = |s: f64| if wiring.covariance == Covariance::NotSquared { s } else { s * s };
-    let scaled =
-        r.map(|row| [row[0] * power(scales[0]), row[1] * power(scales[1]), row[2] * power(scales[2])]);
-    upper(&matrix3::multiply(scaled, matrix3::transpose(r)))
+/// The matrix of a quaternion that may have another length than one.
+fn of_length(unit: Unit, q: [f64; 4]) -> Matrix3<f64> {
+    match unit {
+        Unit::Normalised | Unit::Raw => rotation::quaternion_to_matrix(q),
+        Unit::RawMatrix => rotation::quaternion_to_matrix_raw(q),
+        Unit::RawProduct => {
+            let square = dot4(q, q);
+            rotation::quaternion_to_matrix(q).map(|row| row.map(|v| v * square))
+        }
+    }
 }

@@ -67,7 +67,7 @@ fn activate(storage: Storage, wiring: &Wiring, sample: &mut Sample) {
         (Storage::Logarithms, Activation::Never) => portable::ln(logit / (1.0 - logit)),
     };
     // `Scale::Never` already is a logarithm, whose logarithm no file holds: NaN, which matches nothing.
-    let logarithm = |v: f64| if wiring.scale == Scale::Never { f64::NAN } else { portable::ln(v) };
+    let logarithm = |v: f64| if matches!(wiring.scale, Scale::Never(_)) { f64::NAN } else { portable::ln(v) };
     if storage == Storage::Logarithms {
         sample[range(Field::Scales)].iter_mut().for_each(|v| *v = logarithm(*v));
     }
@@ -80,11 +80,14 @@ fn rearrange(layout: ShLayout, sample: &mut Sample) {
     }
     let old = sh_of(sample);
     let mut new = old;
+    if layout == ShLayout::Bgr {
+        return put_sh(sample, &old.map(|[r, g, b]| [b, g, r]));
+    }
     for k in 1..16 {
         for channel in 0..3 {
             let flat = 3 * (k - 1) + channel;
             new[k][channel] = match layout {
-                ShLayout::Right => old[k][channel],
+                ShLayout::Right | ShLayout::Bgr => old[k][channel],
                 ShLayout::Planar => old[1 + flat % 15][flat / 15],
                 ShLayout::Interleaved => {
                     let planar = channel * 15 + k - 1;

@@ -142,7 +142,7 @@ fn poses(pipeline: &Pipeline<'_>) -> Vec<Array> {
         [x, y, z]
     };
     for (frame, pose) in rig.poses.iter().enumerate() {
-        let state = JointState::new(rig, &Wiring::default(), frame);
+        let state = JointState::new(pipeline, &Wiring::default(), frame);
         numbers[0].extend(pose.axis_angles.iter().flat_map(|&v| axial(v)));
         numbers[1].extend(convention.point(pose.translation.to_array()));
         for j in 0..joints {

@@ -60,6 +60,15 @@ pub fn mat(q: Q) -> M3 {
     ]
 }
 
+/// The matrix of 3DGS, without normalising.
+pub fn raw([w, x, y, z]: Q) -> M3 {
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+}
+
 /// Shepperd: through w where the trace is positive, else through the largest diagonal entry.
 pub fn from_matrix(m: &M3) -> Q {
     let t = m[0][0] + m[1][1] + m[2][2];

@@ -9,7 +9,7 @@ use maths::*;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// The inputs, in the crate's own convention.
+/// The inputs, in the axes and units of the vectors; quaternions with w first, matrices by rows.
 pub struct Inputs {
     pub parents: Vec<Option<usize>>,
     pub rest: Vec<V3>,
@@ -37,28 +37,45 @@ fn matrices(inputs: &Value, name: &str) -> Vec<Vec<[f64; 16]>> {
     all.iter().map(|pose| pose.iter().map(|m| std::array::from_fn(|k| m[k])).collect()).collect()
 }
 
+/// From column by column to row by row.
+fn by_rows(mut all: Vec<Vec<[f64; 16]>>, by_columns: bool) -> Vec<Vec<[f64; 16]>> {
+    for m in all.iter_mut().flatten().filter(|_| by_columns) {
+        *m = std::array::from_fn(|k| m[k % 4 * 4 + k / 4]);
+    }
+    all
+}
+
+/// From (x, y, z, w) to (w, x, y, z).
+fn w_first(mut all: Vec<Q>, w_is_last: bool) -> Vec<Q> {
+    all.iter_mut().filter(|_| w_is_last).for_each(|q| *q = [q[3], q[0], q[1], q[2]]);
+    all
+}
+
 impl Inputs {
     pub fn of(folder: &Path) -> Self {
         let text = std::fs::read_to_string(folder.join("vectors.json")).unwrap();
         let all: Value = serde_json::from_str(&text).unwrap();
         let inputs = &all["inputs"];
         let parents: Vec<i64> = read(inputs, "parents");
+        let xyzw = all["convention"]["quaternions"] == "xyzw";
+        let columns = all["convention"]["matrices"] == "column";
+        let joint_quats: Vec<Vec<Q>> = read(inputs, "joint_quaternions");
         Self {
             parents: parents.iter().map(|&p| usize::try_from(p).ok()).collect(),
             rest: read(inputs, "rest_positions"),
             indices: read(inputs, "indices"),
             weights: read(inputs, "weights"),
             means: read(inputs, "canonical_means"),
-            quats: read(inputs, "canonical_quaternions"),
+            quats: w_first(read(inputs, "canonical_quaternions"), xyzw),
             log_scales: read(inputs, "canonical_log_scales"),
             logits: read(inputs, "canonical_opacity_logits"),
             sh: read(inputs, "canonical_sh"),
             eye: read(inputs, "camera_position"),
             angles: read(inputs, "pose_axis_angles"),
             translations: read(inputs, "pose_translations"),
-            joint_quats: read(inputs, "joint_quaternions"),
-            joint_matrices: matrices(inputs, "joint_matrices"),
-            world_matrices: matrices(inputs, "world_matrices"),
+            joint_quats: joint_quats.into_iter().map(|pose| w_first(pose, xyzw)).collect(),
+            joint_matrices: by_rows(matrices(inputs, "joint_matrices"), columns),
+            world_matrices: by_rows(matrices(inputs, "world_matrices"), columns),
         }
     }
 }
@@ -83,7 +100,12 @@ pub fn skin(inputs: &Inputs, bugs: &[&str]) -> Outs {
     let has = |bug: &str| bugs.contains(&bug);
     (0..inputs.angles.len())
         .map(|pose| {
-            let shown = if has("one-frame-late") { pose.max(1) - 1 } else { pose };
+            let last = inputs.angles.len() - 1;
+            let shown = match pose {
+                _ if has("one-frame-late") => pose.max(1) - 1,
+                _ if has("one-frame-early") => last.min(pose + 1),
+                pose => pose,
+            };
             let joints = joints(inputs, shown, &has);
             (0..inputs.means.len()).map(|i| gaussian(inputs, &joints, i, &has)).collect()
         })
@@ -97,30 +119,9 @@ struct Joints {
 }
 
 fn joints(inputs: &Inputs, pose: usize, has: &dyn Fn(&str) -> bool) -> Joints {
-    let count = inputs.rest.len();
     let mut joints = Joints { linear: vec![], translation: vec![], quats: inputs.joint_quats[pose].clone() };
-    if has("degrees-for-radians") || has("degrees-handed-in") {
-        // Forward kinematics of our own: positions and rotations down the chain.
-        let factor = if has("degrees-for-radians") { 1f64.to_radians() } else { 1f64.to_degrees() };
-        let (mut turned, mut at) = (vec![[1.0, 0.0, 0.0, 0.0]; count], vec![[0.0; 3]; count]);
-        for j in 0..count {
-            let [x, y, z] = inputs.angles[pose][j].map(|c| c * factor);
-            let angle = (x * x + y * y + z * z).sqrt();
-            let s = if angle > 0.0 { (angle / 2.0).sin() / angle } else { 0.5 };
-            let local = [(angle / 2.0).cos(), s * x, s * y, s * z];
-            match inputs.parents[j] {
-                None => (turned[j], at[j]) = (local, inputs.rest[j]),
-                Some(p) => {
-                    turned[j] = mul(turned[p], local);
-                    at[j] = add(at[p], apply(&mat(turned[p]), sub(inputs.rest[j], inputs.rest[p])));
-                }
-            }
-            let r = mat(turned[j]);
-            joints.linear.push(r);
-            joints.translation.push(add(sub(at[j], apply(&r, inputs.rest[j])), inputs.translations[pose]));
-        }
-        joints.quats = turned;
-        return joints;
+    if OF_THE_CHAIN.iter().any(|bug| has(bug)) {
+        return chain(inputs, pose, has);
     }
     let source = if has("bind-pose-missing") { &inputs.world_matrices } else { &inputs.joint_matrices };
     for m in &source[pose] {
@@ -143,6 +144,66 @@ fn joints(inputs: &Inputs, pose: usize, has: &dyn Fn(&str) -> bool) -> Joints {
     }
     if has("joints-xyzw") {
         joints.quats.iter_mut().for_each(|q| *q = [q[1], q[2], q[3], q[0]]);
+    }
+    joints
+}
+
+/// Bugs for which the engine computes its joints itself.
+const OF_THE_CHAIN: [&str; 9] = [
+    "degrees-for-radians",
+    "degrees-handed-in",
+    "local-conjugated",
+    "local-xyzw",
+    "local-wxyz",
+    "chain-reversed",
+    "bind-on-other-side",
+    "translation-missing",
+    "translation-before",
+];
+
+/// Forward kinematics of our own: positions and rotations down the chain.
+fn chain(inputs: &Inputs, pose: usize, has: &dyn Fn(&str) -> bool) -> Joints {
+    let factor = match () {
+        () if has("degrees-for-radians") => 1f64.to_radians(),
+        () if has("degrees-handed-in") => 1f64.to_degrees(),
+        () => 1.0,
+    };
+    let mut joints = Joints { linear: vec![], translation: vec![], quats: vec![] };
+    let mut at: Vec<V3> = vec![];
+    for (j, &rest) in inputs.rest.iter().enumerate() {
+        let [x, y, z] = inputs.angles[pose][j].map(|c| c * factor);
+        let angle = (x * x + y * y + z * z).sqrt();
+        let s = if angle > 0.0 { (angle / 2.0).sin() / angle } else { 0.5 };
+        let mut local = [(angle / 2.0).cos(), s * x, s * y, s * z];
+        if has("local-conjugated") {
+            local = conj(local);
+        } else if has("local-xyzw") {
+            local = [local[1], local[2], local[3], local[0]];
+        } else if has("local-wxyz") {
+            local = [local[3], local[0], local[1], local[2]];
+        }
+        let (turned, position) = match inputs.parents[j] {
+            None => (local, rest),
+            Some(p) if has("chain-reversed") => {
+                let offset = sub(rest, inputs.rest[p]);
+                (mul(local, joints.quats[p]), add(apply(&mat(local), at[p]), offset))
+            }
+            Some(p) => {
+                let offset = sub(rest, inputs.rest[p]);
+                (mul(joints.quats[p], local), add(at[p], apply(&mat(joints.quats[p]), offset)))
+            }
+        };
+        let r = mat(turned);
+        let bind = if has("bind-on-other-side") { rest } else { apply(&r, rest) };
+        let moved = match inputs.translations[pose] {
+            _ if has("translation-missing") => [0.0; 3],
+            t if has("translation-before") => apply(&r, t),
+            t => t,
+        };
+        joints.linear.push(r);
+        joints.translation.push(add(sub(position, bind), moved));
+        joints.quats.push(turned);
+        at.push(position);
     }
     joints
 }
@@ -173,6 +234,9 @@ fn gaussian(inputs: &Inputs, joints: &Joints, i: usize, has: &dyn Fn(&str) -> bo
         let sum = 0.9 + 0.2 * ((i * 7 % 11) as f64 / 11.0);
         row.iter_mut().for_each(|r| r.1 *= sum);
     }
+    if has("weights-eleven-tenths") {
+        row.iter_mut().for_each(|r| r.1 *= 1.1);
+    }
     let mut mean = [0.0; 3];
     for &(j, w) in &row {
         let moved = add(apply(&joints.linear[j], inputs.means[i]), joints.translation[j]);
@@ -181,6 +245,9 @@ fn gaussian(inputs: &Inputs, joints: &Joints, i: usize, has: &dyn Fn(&str) -> bo
     let mut own = inputs.quats[i];
     if has("canonical-xyzw") {
         own = [own[3], own[0], own[1], own[2]];
+    }
+    if has("canonical-conjugated") {
+        own = conj(own);
     }
     let mut relative = blend(joints, &row, has);
     if has("dual-quaternions") {
@@ -210,9 +277,15 @@ fn gaussian(inputs: &Inputs, joints: &Joints, i: usize, has: &dyn Fn(&str) -> bo
     if has("scale-ball") {
         scale = [inputs.log_scales[i].iter().sum::<f64>() / 3.0; 3].map(f64::exp);
     }
-    let spread = if has("activated-scale") { scale.map(f64::exp) } else { scale };
+    let spread = match scale {
+        _ if has("scale-not-activated") => inputs.log_scales[i],
+        scale if has("activated-scale") => scale.map(f64::exp),
+        scale => scale,
+    };
     let r = if has("blended-matrix-not-projected") {
         product(&blended(joints, &row), &mat(own))
+    } else if has("not-normalised-anywhere") {
+        raw(quat)
     } else {
         mat(unit(quat))
     };
@@ -227,9 +300,11 @@ fn gaussian(inputs: &Inputs, joints: &Joints, i: usize, has: &dyn Fn(&str) -> bo
     let length = (away[0] * away[0] + away[1] * away[1] + away[2] * away[2]).sqrt();
     let length = if has("direction-reversed") { -length } else { length };
     let away = away.map(|c| c / length);
-    let direction = if has("sh-not-turned") {
+    let direction = if has("not-normalised-anywhere") {
+        apply(&transpose(&raw(relative)), away)
+    } else if has("sh-not-turned") {
         away
-    } else if has("sh-turned-backwards") {
+    } else if has("sh-turned-backwards") || has("sh-backwards-and-not") {
         apply(&turn, away)
     } else {
         apply(&transpose(&turn), away)
@@ -248,29 +323,25 @@ fn blend(joints: &Joints, row: &[(usize, f64)], has: &dyn Fn(&str) -> bool) -> Q
     let sum = |aligned: bool| {
         let mut sum = [0.0; 4];
         for (q, &(_, w)) in quats.iter().zip(row) {
+            let q = &if has("signs-from-matrices") { from_matrix(&mat(*q)) } else { *q };
             let sign = if aligned && dot(*q, quats[0]) < 0.0 { -1.0 } else { 1.0 };
             (0..4).for_each(|k| sum[k] += sign * w * q[k]);
         }
         sum
     };
-    if has("signs-not-aligned") {
+    if has("signs-not-aligned") || has("signs-from-matrices") {
         return unit(sum(false));
     }
-    if has("not-normalised") {
+    if has("not-normalised") || has("not-normalised-anywhere") {
         return sum(true);
     }
     if has("normalised-sum") || has("dual-quaternions") {
         return unit(sum(true));
     }
-    if has("gram-schmidt") {
-        let b = blended(joints, row);
-        let column = |k: usize| [b[0][k], b[1][k], b[2][k]];
-        let x = unit3(column(0));
-        let y = column(1);
-        let d = x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
-        let y = unit3(sub(y, x.map(|c| c * d)));
-        let z = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
-        return from_matrix(&[[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]]);
+    for (bug, rows, [first, second]) in GRAM_SCHMIDTS {
+        if has(bug) {
+            return orthonormal(blended(joints, row), rows, first, second);
+        }
     }
     let mut a = [[0.0; 4]; 4];
     for (q, &(_, w)) in quats.iter().zip(row) {
@@ -280,7 +351,7 @@ fn blend(joints: &Joints, row: &[(usize, f64)], has: &dyn Fn(&str) -> bool) -> Q
             }
         }
     }
-    for steps in [3, 6] {
+    for steps in [3, 6, 15] {
         if has(&format!("power-{steps}")) {
             let mut v = quats[0];
             for _ in 0..steps {
@@ -290,6 +361,30 @@ fn blend(joints: &Joints, row: &[(usize, f64)], has: &dyn Fn(&str) -> bool) -> Q
         }
     }
     leading(a)
+}
+
+/// Which way a matrix is made orthonormal: over rows, and which two axes first.
+const GRAM_SCHMIDTS: [(&str, bool, [usize; 2]); 5] = [
+    ("gram-schmidt", false, [0, 1]),
+    ("gram-schmidt-z-first", false, [2, 1]),
+    ("gram-schmidt-y-z", false, [1, 2]),
+    ("gram-schmidt-rows", true, [0, 1]),
+    ("gram-schmidt-rows-z-first", true, [2, 0]),
+];
+
+fn orthonormal(b: M3, rows: bool, first: usize, second: usize) -> Q {
+    let b = if rows { b } else { transpose(&b) };
+    let x = unit3(b[first]);
+    let y = b[second];
+    let d = x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+    let y = unit3(sub(y, x.map(|c| c * d)));
+    let cross =
+        |x: V3, y: V3| [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+    let mut m = [[0.0; 3]; 3];
+    (m[first], m[second]) = (x, y);
+    let z = if (first + 1) % 3 == second { cross(x, y) } else { cross(y, x) };
+    m[3 - first - second] = z;
+    from_matrix(&if rows { m } else { transpose(&m) })
 }
 
 fn blended(joints: &Joints, row: &[(usize, f64)]) -> M3 {
@@ -326,6 +421,13 @@ fn colours(inputs: &Inputs, i: usize, turn: &M3, has: &dyn Fn(&str) -> bool) -> 
     if has("sh-turned-backwards") {
         return turned(own, &transpose(turn));
     }
+    if has("sh-backwards-and-not") {
+        let back = turned(own, &transpose(turn));
+        return (0..16).map(|k| if k < 4 { back[k] } else { own[k] }).collect();
+    }
+    if has("bgr-for-rgb") {
+        return right.into_iter().map(|[r, g, b]| [b, g, r]).collect();
+    }
     if has("sh-only-first-band-turned") {
         return (0..16).map(|k| if k < 4 { right[k] } else { own[k] }).collect();
     }
@@ -352,6 +454,13 @@ fn finish(out: &mut Out, has: &dyn Fn(&str) -> bool) {
         out.covariance[1] *= -1.0;
         out.covariance[2] *= -1.0;
         [3, 4, 7, 10, 13, 15].iter().for_each(|&k: &usize| out.sh[k] = out.sh[k].map(|c| -c));
+    }
+    if has("mirrored-shape") {
+        // As before, but for what the colour is made of.
+        out.mean[0] *= -1.0;
+        out.quat = [out.quat[0], out.quat[1], -out.quat[2], -out.quat[3]];
+        out.covariance[1] *= -1.0;
+        out.covariance[2] *= -1.0;
     }
     if has("y-up-for-z-up") {
         // (x, -z, y): everything in the world turns by 90 degrees about x.
@@ -386,6 +495,22 @@ pub fn json_of(outs: &Outs, fields: &[&str]) -> String {
         });
     }
     answer.to_string()
+}
+
+/// Every number rounded to a half float, and widened again.
+pub fn halved(outs: &Outs) -> Outs {
+    let half = |v: &mut f64| {
+        let step = 2f64.powi(v.abs().log2().floor().max(-14.0) as i32 - 10);
+        *v = (*v / step).round_ties_even() * step;
+    };
+    let mut outs = outs.clone();
+    for o in outs.iter_mut().flatten() {
+        let fields = [&mut o.mean[..], &mut o.quat, &mut o.scale, &mut o.covariance, &mut o.direction];
+        fields.into_iter().flatten().for_each(half);
+        o.sh.iter_mut().flatten().for_each(half);
+        half(&mut o.opacity);
+    }
+    outs
 }
 
 /// Every field.
