@@ -76,9 +76,21 @@ fn avatars_that_are_wrong() {
         ),
         (good.text().replace("element vertex 6", "element vertex 7").into_bytes(), vec!["7"], "a row short"),
         (good.text().replace("property float x", "property quad x").into_bytes(), vec!["quad"], "type"),
+        (points("").into_bytes(), vec!["element vertex", "a point cloud"], "points"),
+        (
+            points("element face 1\nproperty list uchar int vertex_indices\n").into_bytes(),
+            vec!["element vertex", "a mesh"],
+            "a mesh",
+        ),
     ] {
         refused(&desk, &content, &parts, what);
     }
+}
+
+/// A PLY of points, with more elements.
+fn points(elements: &str) -> String {
+    let properties = "property float x\nproperty float y\nproperty float z\n";
+    format!("ply\nformat ascii 1.0\nelement vertex 1\n{properties}{elements}end_header\n0 0 0\n3 0 0 0\n")
 }
 
 #[test]
@@ -152,6 +164,11 @@ fn cameras_that_are_wrong() {
             with("world_to_camera", json!([[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1]])),
             vec!["world_to_camera"],
             "singular",
+        ),
+        (
+            with("world_to_camera", json!([[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, 2, 3], [0, 0, 0, 1]])),
+            vec!["world_to_camera", "times 2.0000"],
+            "scaled",
         ),
         (with("background", json!([1, 1])), vec!["length 2"], "two colours"),
     ] {

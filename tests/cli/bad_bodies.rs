@@ -143,6 +143,18 @@ fn files_cut_off_anywhere() {
     }
 }
 
+#[test]
+fn pointers_of_git_lfs_are_named() {
+    let desk = desk();
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:abc\nsize 3\n";
+    for name in ["pointer.npz", "pointer.pkl", "pointer.glb", "pointer.gltf"] {
+        desk.put(name, pointer);
+        skin(&desk, name, "poses.npz").refuses(&[name, "Git LFS"], name);
+        skin(&desk, "body.npz", name).refuses(&[name, "Git LFS"], name);
+        desk.run(args!["inspect", name]).refuses(&[name, "Git LFS"], name);
+    }
+}
+
 /// Files of 128 bytes whose headers announce terabytes.
 #[test]
 fn absurd_shapes_are_refused_before_they_are_allocated() {

@@ -1,6 +1,7 @@
 //! Bodies, poses and rigs of other people, through the program: where Gaussians end, and what is said.
 
 use crate::args;
+use crate::files::{Values, npz};
 use crate::program::{Answer, Desk};
 use crate::support::data;
 use glam::Vec3;
@@ -32,6 +33,76 @@ fn a_part_that_is_missing_moves_nothing() {
     let (without_face, _) = skinned("smplx.ply", "smplx.npz", Some("poses_no_face.npz"), AVERAGE);
     assert_eq!(complete, without_face);
     assert_ne!(complete.rotations[25], complete.rotations[24], "the index finger turns");
+}
+
+#[test]
+fn parts_beside_a_whole_pose_are_said_where_they_differ() {
+    let desk = Desk::new();
+    let said = |arrays: &[(&str, &[u64], Values)]| {
+        npz(&desk.path("poses.npz"), arrays);
+        let arguments = args!["skin", file("smplx.ply"), "--body", file("smplx.npz"), "--out", "o.ply"];
+        desk.run([arguments, args!["--poses", "poses.npz"]].concat()).exits(0, "posed").err
+    };
+    let turned = |count: usize, at: usize| {
+        let mut values = vec![0.0; count];
+        values[at] = 0.6;
+        Values::F64(values)
+    };
+    let finger = said(&[("poses", &[1, 66], turned(66, 5)), ("left_hand_pose", &[1, 45], turned(45, 2))]);
+    assert!(finger.contains("left_hand_pose: not read, as another array has the part"), "{finger}");
+    let other = said(&[("thetas", &[1, 66], turned(66, 5)), ("body_pose", &[1, 63], turned(63, 3))]);
+    assert!(other.contains("body_pose: not read"), "{other}");
+    // AMASS repeats in parts what the whole vector has.
+    let amass = said(&[
+        ("poses", &[1, 165], turned(165, 5)),
+        ("root_orient", &[1, 3], Values::F64(vec![0.0; 3])),
+        ("pose_body", &[1, 63], turned(63, 2)),
+        ("pose_hand", &[1, 90], Values::F64(vec![0.0; 90])),
+    ]);
+    assert!(!amass.contains("not read"), "{amass}");
+}
+
+/// Numbers that are finite and no pose: said of the file that holds them, not of the file that was to be written.
+#[test]
+fn poses_beyond_all_bodies_are_refused() {
+    let desk = Desk::new();
+    for (name, shape, width, value) in
+        [("trans", [1, 3], 3, 1e154), ("poses", [1, 165], 165, 1e154), ("scale", [1, 1], 1, 1e38)]
+    {
+        let mut values = vec![0.0; width];
+        values[width - 1] = value;
+        let mut arrays = vec![(name, &shape[..], Values::F64(values))];
+        if name != "poses" {
+            arrays.push(("poses", &[1, 165], Values::F64(vec![0.0; 165])));
+        }
+        npz(&desk.path("far.npz"), &arrays);
+        let arguments = args!["skin", file("smplx.ply"), "--body", file("smplx.npz"), "--out", "o.ply"];
+        desk.run([arguments, args!["--poses", "far.npz"]].concat()).refuses(&["far.npz: poses[0]"], name);
+        assert!(!desk.path("o.ply").exists());
+    }
+}
+
+#[test]
+fn options_without_effect_are_refused() {
+    let desk = Desk::new();
+    let body = || args!["smpl.ply", "--body", file("smpl.npz"), "--out", "o.ply"];
+    std::fs::copy(file("smpl.ply"), desk.path("smpl.ply")).unwrap();
+    desk.run([args!["skin"], body(), args!["--frame", "3"]].concat())
+        .refuses(&["--frame 3 without --poses"], "skin");
+    let rest = desk.run([args!["skin"], body()].concat()).exits(0, "the rest pose");
+    assert!(rest.err.contains("no --poses: the body is at rest"), "{}", rest.err);
+    let hint = args!["export", "nofile", "--to", "spz-hint", "--out", "x.spz"];
+    desk.run(hint).refuses(&["--out with --to spz-hint"], "a hint writes nothing");
+}
+
+/// 24 joints of SMPL on a body of SMPL-X: hands become jaw and eye.
+#[test]
+fn an_avatar_of_another_body_is_said() {
+    let desk = Desk::new();
+    let answer = desk.run(args!["skin", file("smpl.ply"), "--body", file("smplx.npz"), "--out", "o.ply"]);
+    assert!(answer.err.contains("of the body's 55: made for another body?"), "{}", answer.err);
+    let own = desk.run(args!["skin", file("smplx.ply"), "--body", file("smplx.npz"), "--out", "o.ply"]);
+    assert!(!own.err.contains("another body"), "{}", own.err);
 }
 
 #[test]
@@ -73,6 +144,22 @@ fn gaussians_grow_with_joints_that_scale() {
     let body = desk.put("sheared.gltf", text);
     let answer = desk.run(args!["skin", file("scaled.ply"), "--body", body, "--out", "o.ply"]);
     assert!(answer.err.contains("scales by unequal factors"), "{}", answer.err);
+}
+
+#[test]
+fn joints_that_mirror_or_scale_by_0_are_said() {
+    let desk = Desk::new();
+    let rig: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(file("scaled.gltf")).unwrap()).unwrap();
+    let joint = rig["skins"][0]["joints"][0].as_u64().unwrap() as usize;
+    for (scale, note) in [([-1.0, 1.0, 1.0], "mirrored"), ([0.0; 3], "scaled by 0")] {
+        let mut rig = rig.clone();
+        rig["nodes"][joint]["scale"] = serde_json::json!(scale);
+        let body = desk.put("odd.gltf", rig.to_string());
+        let answer = desk.run(args!["skin", file("scaled.ply"), "--body", &body, "--out", "o.ply"]);
+        assert_eq!(answer.err.matches(note).count(), 1, "{}", answer.err);
+        assert!(desk.ok(args!["inspect", &body]).contains(note), "{note}");
+    }
 }
 
 #[test]

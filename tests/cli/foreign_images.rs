@@ -131,6 +131,11 @@ fn jpegs_that_end_early_are_refused_as_pngs_are() {
     for cut in (whole.len() / 4..whole.len() - 1).step_by(7) {
         wrong += usize::from(load_image(&desk.put("cut.jpg", &whole[..cut])).is_ok());
     }
+    // The same with an end put behind the cut, as a rescue tool does.
+    for cut in (whole.len() / 2..whole.len() - 8).step_by(7) {
+        let patched = [&whole[..cut], b"\xFF\xD9"].concat();
+        wrong += usize::from(load_image(&desk.put("cut.jpg", patched)).is_ok());
+    }
     assert_eq!(wrong, 0);
     let answer = desk.run(args!["score", case("truncated-jpeg/cut.jpg"), "whole.jpg"]);
     assert_eq!((answer.code, answer.out.as_str()), (Some(2), ""), "{answer:?}");
@@ -161,4 +166,9 @@ fn arrays_of_integers_count_as_pixels_do() {
         of("f4.npy", npy(&shape, &[0.0_f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 12.0, 255.0]));
     let error = load_image(&floats).unwrap_err().to_string();
     assert!(error.contains("floats from 0 to 255"), "{error}");
+    let centred = of("centred.npy", npy(&shape, &[-1.0_f32; 12]));
+    assert!(load_image(&centred).unwrap_err().to_string().contains("floats from -1 to 0"));
+    let low = of("low.npy", npy(&shape, &[0_u16, 0, 255, 0, 0, 0, 0, 0, 0, 0, 0, 7]));
+    let error = load_image(&low).unwrap_err().to_string();
+    assert!(error.contains("values up to 255") && error.contains("65535"), "{error}");
 }

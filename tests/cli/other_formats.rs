@@ -320,6 +320,16 @@ fn cameras_of_3dgs_and_nerfstudio_are_read() {
     );
     let angle = 2.0 * (32.0f64 / 60.0).atan();
     desk.put("angle.json", nerf(serde_json::json!({ "w": 64, "h": 48, "camera_angle_x": angle })));
+    use crate::files::Values::{F64, I64};
+    let w2c = vec![1., 0., 0., 0., 0., -1., 0., 0.1, 0., 0., -1., 1., 0., 0., 0., 1.];
+    let own = [
+        ("intrinsic", &[3u64, 3][..], F64(vec![60., 0., 32., 0., 60., 24., 0., 0., 1.])),
+        ("extrinsic", &[4, 4], F64(w2c)),
+        ("width", &[], I64(vec![64])),
+        ("height", &[], I64(vec![48])),
+        ("dist", &[5], F64(vec![0.1; 5])),
+    ];
+    crate::files::npz(&desk.path("own.npz"), &own);
     let drawn = |camera: &str| {
         let answer = desk.run(args!["render", "avatar.ply", "--camera", camera, "--out", "o.npy"]);
         let answer = answer.exits(0, camera);
@@ -328,8 +338,9 @@ fn cameras_of_3dgs_and_nerfstudio_are_read() {
     let (expected, _) = drawn("own.json");
     for (camera, note) in [
         ("cameras.json", "no principal point"),
-        ("transforms.json", "lens distortion of the file is left out"),
-        ("angle.json", ""),
+        ("transforms.json", "lens distortion of the file is left out; the file has no fl_y"),
+        ("angle.json", "no cx"),
+        ("own.npz", "own.npz: not read: dist"),
     ] {
         let (found, said) = drawn(camera);
         assert!(apart(&found, &expected).0 < 1e-6, "{camera}");

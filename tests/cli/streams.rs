@@ -141,6 +141,15 @@ fn names_are_printed_without_what_a_terminal_obeys() {
     copy(&desk.path("data/tiny"), &desk.path("data/a\u{1b}[31mb"));
     let said = desk.run([run("run"), args!["--subject", "a\u{1b}[31mb"]].concat());
     assert!(!said.err.contains('\u{1b}') && !said.out.contains('\u{1b}'), "{said:?}");
+    // What turns the direction of writing.
+    let turned = ['\u{202e}', '\u{2066}'];
+    let rig = std::fs::read_to_string(crate::support::data("small/foreign_bodies/scaled.gltf")).unwrap();
+    let mut rig: serde_json::Value = serde_json::from_str(&rig).unwrap();
+    rig["nodes"][0]["name"] = serde_json::json!("\u{202e}a\u{2066}b");
+    desk.put("rig.gltf", rig.to_string());
+    assert!(!desk.ok(args!["inspect", "rig.gltf"]).contains(turned));
+    let said = desk.run(args!["inspect", "\u{202e}.ply"]);
+    assert!(said.code == Some(2) && !said.err.contains(turned), "{said:?}");
 }
 
 /// Whether a process does something of its own about SIGTERM.

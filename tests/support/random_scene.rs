@@ -72,6 +72,14 @@ pub fn camera(random: &mut Random, width: u32, height: u32) -> Camera {
     camera
 }
 
+/// True if no two view depths are so close that an f32 may not tell them apart: ties are drawn in the order of the list.
+pub fn has_distinct_depths(posed: &OwnedPosed, camera: &Camera) -> bool {
+    let depth = |mean: &Vec3| camera.camera_from_world.transform_point3(mean.as_dvec3()).z;
+    let mut depths: Vec<f64> = posed.means.iter().map(depth).collect();
+    depths.sort_by(f64::total_cmp);
+    depths.windows(2).all(|pair| pair[1] - pair[0] > 1e-6 * pair[1].abs())
+}
+
 /// Gaussians about the origin, some of them behind the cameras of [`camera`].
 pub fn posed(random: &mut Random, count: usize) -> OwnedPosed {
     let sh_degree = random.below(4);

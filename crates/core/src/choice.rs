@@ -19,6 +19,9 @@ pub fn nearest<'k, S: AsRef<str>>(given: &str, known: &'k [S]) -> Option<&'k str
 /// `one of a, b, c`, and which of them was probably meant: what was expected where something else was given.
 pub fn one_of<S: AsRef<str>>(given: &str, known: &[S]) -> String {
     let list = known.iter().map(AsRef::as_ref).collect::<Vec<_>>().join(", ");
+    if list.is_empty() {
+        return "nothing: there is none to choose from".to_owned();
+    }
     match nearest(given, known) {
         Some(meant) => format!("one of {list}; is `{meant}` meant?"),
         None => format!("one of {list}"),
@@ -39,5 +42,6 @@ mod tests {
         assert_eq!(nearest::<&str>("swap", &[]), None);
         assert_eq!(one_of("swp", &["lbs", "swap"]), "one of lbs, swap; is `swap` meant?");
         assert_eq!(one_of("x", &["lbs", "swap"]), "one of lbs, swap");
+        assert!(one_of::<&str>("x", &[]).starts_with("nothing"));
     }
 }

@@ -15,7 +15,9 @@ use super::poses::{self, PoseTrack};
 use super::{Capture, Error, Sequence, camera, error, listing};
 use super::{FrameFiles, FrameRef, FrameSource, MaskFile};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use skinsplat_core::scene::Camera;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// How a subject is loaded.
@@ -136,7 +138,12 @@ fn sequence_folders(folder: &Path, prefix: &str) -> Result<Vec<String>, Error> {
 struct Transforms {
     model: Option<String>,
     frames: Vec<ListedFrame>,
+    #[serde(flatten)]
+    others: BTreeMap<String, IgnoredAny>,
 }
+
+/// Keys of `transforms.json` that others read, or that describe it.
+const OTHER_KEYS: [&str; 4] = ["betas", "cameras", "convention", "poses"];
 
 #[derive(Deserialize)]
 struct ListedFrame {
@@ -144,6 +151,27 @@ struct ListedFrame {
     mask_path: Option<String>,
     camera: usize,
     time: usize,
+    #[serde(flatten)]
+    others: BTreeMap<String, IgnoredAny>,
+}
+
+impl Transforms {
+    /// What has to be said of it: keys that nothing reads, images that count more than once.
+    fn notes(&self) -> Vec<String> {
+        let top = self.others.keys().filter(|key| !OTHER_KEYS.contains(&key.as_str())).cloned();
+        let in_frames = self.frames.iter().flat_map(|frame| frame.others.keys());
+        let unread: BTreeSet<String> = top.chain(in_frames.map(|key| format!("frames.{key}"))).collect();
+        let unread: Vec<String> = unread.iter().map(|key| key.escape_debug().to_string()).collect();
+        let mut seen = BTreeSet::new();
+        let again = self.frames.iter().find(|frame| !seen.insert((&frame.file_path, frame.camera)));
+        let again =
+            again.map(|frame| format!("{} is listed more than once, and counts as often", frame.file_path));
+        (!unread.is_empty())
+            .then(|| format!("not read: {}", unread.join(", ")))
+            .into_iter()
+            .chain(again)
+            .collect()
+    }
 }
 
 /// Where a sequence keeps its parts.
@@ -175,9 +203,10 @@ fn load_sequence(folder: &Path, id: &str, models: &mut Models) -> Result<Sequenc
     let files = Files::of(folder);
     let transforms: Transforms =
         error::read_json(&files.listing, "frames", "model, cameras and frames of a sequence")?;
+    transforms.notes().iter().for_each(|note| models.note(&files.listing, note));
     let cameras = files.cameras()?;
     let track = files.poses()?;
-    let body = models.of_track(&files.listing, transforms.model.as_deref(), &track)?;
+    let body = models.of_track(&files.or_listing("poses.npz"), transforms.model.as_deref(), &track)?;
     let poses = track.poses(&body.skeleton)?;
     let frames = frames_of(&files, transforms.frames, poses.len(), cameras.len())?;
     Ok(Sequence { id: id.to_owned(), body, poses, cameras: cameras.into(), frames, stored_sizes: None })

@@ -38,6 +38,7 @@ pub mod frames;
 pub mod gltf;
 pub mod hdf5;
 mod image_size;
+mod jpeg_scan;
 pub mod key;
 pub mod layouts;
 pub mod listing;
@@ -57,6 +58,7 @@ pub mod source;
 mod sourced;
 pub mod splatting_avatar;
 pub mod torch;
+pub mod words;
 
 pub use capture::Capture;
 pub use error::Error;

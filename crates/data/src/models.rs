@@ -9,6 +9,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// No clothing is farther from the body, metres.
+const THICKEST: f64 = 0.5;
+
 /// Which of the bodies of a family a subject has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -118,7 +121,8 @@ impl<'a> Models<'a> {
         &self.shapes
     }
 
-    fn note(&mut self, path: &Path, note: &str) {
+    /// Adds what has to be said of a file.
+    pub(crate) fn note(&mut self, path: &Path, note: &str) {
         let note = format!("{}: {note}", path.display());
         if !self.notes.contains(&note) {
             self.notes.push(note);
@@ -235,6 +239,11 @@ impl<'a> Models<'a> {
         let offsets = self.subject.join("gt_normal_offset.npy");
         if self.options.clothing && offsets.is_file() {
             let array = npy::read(&offsets)?;
+            if let Some(i) = array.values.iter().position(|v| v.is_nan() || v.abs() > THICKEST) {
+                let problem = format!("{:e}", array.values[i]);
+                let expected = format!("metres of clothing, at most {THICKEST}");
+                return Err(Error::invalid(&offsets, format!("value {i}"), problem, expected));
+            }
             let values: Vec<f32> = array.values.iter().map(|&v| v as f32).collect();
             rest = rest.with_normal_offset(&values).map_err(|e| Error::scene(&offsets, e))?;
         }

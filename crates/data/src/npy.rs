@@ -72,9 +72,16 @@ pub fn write_f32(path: &Path, shape: &[usize], values: impl IntoIterator<Item = 
     })
 }
 
-/// Reads an array of numbers; errors name `field`.
-pub(super) fn read_array(mut reader: impl Read, field: &str) -> Result<Array, SceneError> {
+/// Reads an array of numbers that takes `most` bytes as `f64` at most; errors name `field`.
+pub(super) fn read_array(mut reader: impl Read, most: u64, field: &str) -> Result<Array, SceneError> {
     let header = read_header(&mut reader, field)?;
+    // Another order of the axes needs a second copy.
+    let copies = if header.fortran_order { 2 } else { 1 };
+    let bytes = count(&header, field)? as u64 * 8 * copies;
+    if bytes > most {
+        let expected = format!("at most {most} bytes in memory for a compressed array of its length");
+        return Err(SceneError::new(field, format!("shape {:?}, {bytes} bytes", header.shape), expected));
+    }
     read_values(reader, &header, field)
 }
 
@@ -106,11 +113,13 @@ fn read_values(reader: impl Read, header: &Header, field: &str) -> Result<Array,
         ('u', 8) => |b| u64::from_le_bytes(sized(b)) as f64,
         _ => return Err(type_error(&header.descr, field)),
     };
-    let mut bytes = read_elements(reader, header, size, field)?;
-    if big_endian {
-        bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
-    }
-    let mut values: Vec<f64> = bytes.chunks_exact(size).map(convert).collect();
+    let mut values: Vec<f64> = Vec::new();
+    read_elements(reader, header, size, field, |bytes| {
+        if big_endian {
+            bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
+        }
+        values.extend(bytes.chunks_exact(size).map(convert));
+    })?;
     if header.fortran_order {
         values = to_c_order(&values, &header.shape);
     }
@@ -147,7 +156,6 @@ fn read_strings(reader: impl Read, header: &Header, field: &str) -> Result<Vec<S
     let Some(size) = size.filter(|&s| s > 0) else {
         return Err(SceneError::new(field, format!("type {}", header.descr), "strings (U or S)"));
     };
-    let bytes = read_elements(reader, header, size, field)?;
     let string = |element: &[u8]| -> String {
         let unit =
             |b: &[u8]| if big_endian { u32::from_be_bytes(sized(b)) } else { u32::from_le_bytes(sized(b)) };
@@ -158,7 +166,9 @@ fn read_strings(reader: impl Read, header: &Header, field: &str) -> Result<Vec<S
         };
         text.trim_end_matches('\0').to_owned()
     };
-    Ok(bytes.chunks_exact(size).map(string).collect())
+    let mut strings = Vec::new();
+    read_elements(reader, header, size, field, |bytes| strings.extend(bytes.chunks_exact(size).map(string)))?;
+    Ok(strings)
 }
 
 /// Reads the header and leaves the reader at the first element.
@@ -223,29 +233,49 @@ fn type_error(descr: &str, field: &str) -> SceneError {
     SceneError::new(field, format!("type {descr}{hint}"), expected)
 }
 
-/// Reads exactly the elements that the shape announces; memory grows with what arrives, not with what is announced.
+/// How many elements the shape announces.
+fn count(header: &Header, field: &str) -> Result<usize, SceneError> {
+    let count = header.shape.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
+    count.filter(|&n| n <= MAX_VALUES).ok_or_else(|| {
+        SceneError::new(field, format!("shape {:?}", header.shape), format!("at most {MAX_VALUES} values"))
+    })
+}
+
+/// Bytes that are read at a time, about.
+const CHUNK: usize = 1 << 20;
+
+/// Reads exactly the elements that the shape announces and hands them on, whole ones at a time: memory grows with what arrives, not
+/// with what is announced.
 fn read_elements(
-    reader: impl Read,
+    mut reader: impl Read,
     header: &Header,
     size: usize,
     field: &str,
-) -> Result<Vec<u8>, SceneError> {
-    let count = header.shape.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
+    mut take: impl FnMut(&mut [u8]),
+) -> Result<(), SceneError> {
     let total =
-        count.filter(|&n| n <= MAX_VALUES).and_then(|n| n.checked_mul(size)).filter(|&n| n <= MAX_VALUES * 8);
-    let Some(total) = total else {
-        let expected = format!("at most {MAX_VALUES} values");
-        return Err(SceneError::new(field, format!("shape {:?}", header.shape), expected));
-    };
+        count(header, field)?.checked_mul(size).filter(|&n| n <= MAX_VALUES * 8).ok_or_else(|| {
+            let expected = format!("at most {} bytes", MAX_VALUES * 8);
+            SceneError::new(field, format!("shape {:?} of {size} bytes each", header.shape), expected)
+        })?;
+    let whole = (CHUNK / size).max(1) * size;
     let mut bytes = Vec::new();
-    reader.take(total as u64).read_to_end(&mut bytes).map_err(|cause| {
-        SceneError::new(field, format!("cannot read: {cause}"), format!("{total} bytes of array data"))
-    })?;
-    if bytes.len() < total {
-        let expected = format!("{total} for shape {:?}", header.shape);
-        return Err(SceneError::new(field, format!("truncated, {} bytes", bytes.len()), expected));
+    let mut done = 0;
+    while done < total {
+        bytes.clear();
+        let wanted = whole.min(total - done);
+        reader.by_ref().take(wanted as u64).read_to_end(&mut bytes).map_err(|cause| {
+            SceneError::new(field, format!("cannot read: {cause}"), format!("{total} bytes of array data"))
+        })?;
+        if bytes.len() < wanted {
+            let expected = format!("{total} for shape {:?}", header.shape);
+            let problem = format!("truncated, {} bytes", done + bytes.len());
+            return Err(SceneError::new(field, problem, expected));
+        }
+        done += wanted;
+        take(&mut bytes);
     }
-    Ok(bytes)
+    Ok(())
 }
 
 fn sized<const N: usize>(bytes: &[u8]) -> [u8; N] {

@@ -79,7 +79,7 @@ impl Archive {
     /// # Errors
     /// If it is missing or its header is broken.
     pub fn header(&mut self, name: &str) -> Result<Header, Error> {
-        self.entry(name, |mut reader| npy::read_header(&mut reader, name))?
+        self.entry(name, |mut reader, _| npy::read_header(&mut reader, name))?
             .ok_or_else(|| self.missing(name, "an array"))
     }
 
@@ -88,7 +88,7 @@ impl Archive {
     /// # Errors
     /// Broken or truncated data, or another type than numbers.
     pub fn array(&mut self, name: &str) -> Result<Option<Array>, Error> {
-        self.entry(name, |reader| npy::read_array(reader, name))
+        self.entry(name, |reader, length| npy::read_array(reader, expanded(length), name))
     }
 
     /// An array of strings; `None` if there is none of that name.
@@ -96,7 +96,7 @@ impl Archive {
     /// # Errors
     /// Broken or truncated data, or another type than strings.
     pub fn text(&mut self, name: &str) -> Result<Option<Vec<String>>, Error> {
-        self.entry(name, |reader| npy::read_text(reader, name))
+        self.entry(name, |reader, _| npy::read_text(reader, name))
     }
 
     /// An array of finite numbers whose shape fits `pattern`, such as `"V,3"`. A letter stands for any extent when it
@@ -147,17 +147,27 @@ impl Archive {
         Error::missing(&self.path, name, &self.names(), expected)
     }
 
+    /// Reads an array of the archive, given how long it is there.
     fn entry<T>(
         &mut self,
         name: &str,
-        read: impl FnOnce(&mut dyn Read) -> Result<T, SceneError>,
+        read: impl FnOnce(&mut dyn Read, u64) -> Result<T, SceneError>,
     ) -> Result<Option<T>, Error> {
         let Some(index) = self.inner.index_for_name(&file_name(name)) else { return Ok(None) };
         let mut entry = self.inner.by_index(index).map_err(|cause| {
             Error::invalid(&self.path, name, format!("cannot read: {cause}"), "a stored or deflated array")
         })?;
-        read(&mut entry).map(Some).map_err(|e| Error::scene(&self.path, e))
+        let length = entry.compressed_size();
+        read(&mut entry, length).map(Some).map_err(|e| Error::scene(&self.path, e))
     }
+}
+
+/// The bytes that may come of so many compressed ones: what deflate can expand them to, and 64 MB for narrower types that become
+/// `f64`.
+fn expanded(compressed: u64) -> u64 {
+    /// A byte of deflate stands for at most so many.
+    const DEFLATE: u64 = 1032;
+    compressed.saturating_mul(DEFLATE).saturating_add(1 << 26)
 }
 
 /// What numpy appends to the name of an array.

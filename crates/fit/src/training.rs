@@ -28,6 +28,8 @@ pub(super) fn prepared(sequence: &Sequence, most_frames: usize) -> Result<Sequen
 /// The largest extent of a body's surface, metres: edges are halved until they are millimetres long, and a body in other
 /// units takes all memory.
 const LARGEST_EXTENT: f64 = 10.0;
+/// The smallest, metres: no person, in whatever units.
+const SMALLEST_EXTENT: f64 = 0.01;
 
 fn check_extent(sequence: &Sequence) -> Result<(), Error> {
     let body = &*sequence.body;
@@ -36,11 +38,15 @@ fn check_extent(sequence: &Sequence) -> Result<(), Error> {
         (low.min(corner), high.max(corner))
     });
     let extent = (high - low).max_element();
-    if extent <= LARGEST_EXTENT {
+    if (SMALLEST_EXTENT..=LARGEST_EXTENT).contains(&extent) {
         return Ok(());
     }
-    let size = if extent < 1e4 { format!("{extent:.1}") } else { format!("{extent:e}") };
+    let size = if (0.1..1e4).contains(&extent) { format!("{extent:.1}") } else { format!("{extent:e}") };
     let field = format!("sequence {}: body", sequence.id);
-    let expected = format!("at most {LARGEST_EXTENT} m: vertices in metres (are these centimetres?)");
+    let expected = if extent < SMALLEST_EXTENT {
+        format!("at least {SMALLEST_EXTENT} m: vertices in metres")
+    } else {
+        format!("at most {LARGEST_EXTENT} m: vertices in metres (are these centimetres?)")
+    };
     Err(Error::invalid(field, format!("its surface is {size} m across"), expected))
 }

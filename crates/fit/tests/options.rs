@@ -83,4 +83,8 @@ fn values_out_of_range_are_refused_by_name() {
         let error = Recipe::parse(&format!("pure-skinned+{text}")).unwrap_err().to_string();
         assert!(error.contains(field) && error.contains("expected"), "{error}");
     }
+    for (text, field) in [("texture=9000", "mesh.texture"), ("gutter=5000", "mesh.gutter")] {
+        let error = Recipe::parse(&format!("haha+mesh.{text}")).unwrap_err().to_string();
+        assert!(error.contains(field) && error.contains("expected"), "{error}");
+    }
 }

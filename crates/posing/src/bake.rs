@@ -35,7 +35,13 @@ pub fn bake(posed: &Posed<'_>, canonical: &Gaussians) -> Baked {
     for (i, &factor) in posed.factors.iter().enumerate() {
         let (rotation, log_scale) = match posed.rotations {
             Some(rotations) => (rotations[i], log_norms(factor, canonical.log_scales[i])),
-            None => principal_axes(factor),
+            None => {
+                let (rotation, lengths) = principal_axes(factor);
+                // A disc without thickness stays one.
+                let flat = canonical.log_scales[i].min_element() == f32::NEG_INFINITY;
+                let length = |ln: f32| if flat && ln <= NO_LENGTH { f32::NEG_INFINITY } else { ln };
+                (rotation, Vec3::from_array(lengths.to_array().map(length)))
+            }
         };
         gaussians.rotations.push(rotation);
         gaussians.log_scales.push(log_scale);
@@ -58,13 +64,20 @@ pub fn bake(posed: &Posed<'_>, canonical: &Gaussians) -> Baked {
     Baked { gaussians, loss }
 }
 
-/// Logarithms of the column norms of M = R diag(s): the canonical ones, bit for bit, unless the strategy changed sizes.
+/// The logarithm of the smallest length that [`principal_axes`] gives, and a little.
+const NO_LENGTH: f32 = -87.33;
+
+/// Logarithms of the column norms of M = R diag(s): the canonical ones, bit for bit, unless the strategy changed sizes. What has no
+/// length (a flat Gaussian's -inf) keeps it.
 fn log_norms(factor: Mat3, canonical: Vec3) -> Vec3 {
-    let measured = Vec3::from_array(
-        [factor.x_axis, factor.y_axis, factor.z_axis].map(|c| portable::ln(c.as_dvec3().length()) as f32),
-    );
-    let unchanged = (measured - canonical).abs().max_element() <= 1e-4;
-    if unchanged || !measured.is_finite() { canonical } else { measured }
+    let columns = [factor.x_axis, factor.y_axis, factor.z_axis];
+    let measured = columns.map(|c| portable::ln(c.as_dvec3().length()) as f32);
+    let sizes = measured.iter().zip(canonical.to_array()).filter(|(measured, _)| measured.is_finite());
+    if sizes.clone().all(|(measured, canonical)| (measured - canonical).abs() <= 1e-4) {
+        return canonical;
+    }
+    let kept = |axis: usize| if measured[axis].is_finite() { measured[axis] } else { canonical[axis] };
+    Vec3::new(kept(0), kept(1), kept(2))
 }
 
 /// Rotation (w, x, y, z) and log scales with R diag(s)² Rᵀ = M Mᵀ.
@@ -132,6 +145,16 @@ mod tests {
             assert!(error.to_cols_array().iter().all(|e| e.abs() < 3e-6), "{error} for {factor}");
             assert!(matrix3::is_finite(rotation::quaternion_to_matrix(rotation)), "{rotation:?}");
         }
+    }
+
+    #[test]
+    fn a_flat_gaussian_grows_where_it_has_a_length() {
+        let canonical = Vec3::new(-2.5, -2.0, f32::NEG_INFINITY);
+        let factor = |s: f32| Mat3::from_diagonal(canonical.map(|ln| s * ln.exp()));
+        assert_eq!(log_norms(factor(1.0), canonical), canonical);
+        let small = log_norms(factor(0.01), canonical);
+        assert!((small.x - (-2.5 + 0.01f32.ln())).abs() < 1e-5, "{small}");
+        assert_eq!(small.z, f32::NEG_INFINITY);
     }
 
     #[test]

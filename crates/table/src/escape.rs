@@ -19,9 +19,15 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Control characters, line and paragraph separators, and marks that turn the direction of writing.
-pub(crate) fn is_hidden(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+/// Control characters, line and paragraph separators, marks that turn the direction of writing, and what has no width (but the
+/// joiners, which scripts are written with).
+pub fn is_hidden(c: char) -> bool {
+    c.is_control()
+        || matches!(
+            c,
+            '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}'
+                | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}'
+        )
 }
 
 /// A number's text with a true minus sign; also that of a number among words, where a hyphen stays one.
@@ -72,6 +78,8 @@ mod tests {
     fn nothing_hidden_stays() {
         assert_eq!(visible("plain ü −"), "plain ü −");
         assert_eq!(visible("a\nb\tc\u{1b}[31m\u{202e}"), "a b c\\u{1b}[31m\\u{202e}");
+        assert_eq!(visible("\u{200b}\u{2066}\u{e0041}"), "\\u{200b}\\u{2066}\\u{e0041}");
+        assert_eq!(visible("क्\u{200d}ष"), "क्\u{200d}ष");
     }
 
     #[test]

@@ -20,9 +20,24 @@ pub fn to_json(value: &impl Serialize) -> String {
     for c in text.chars() {
         match c {
             '\n' => shown.push('\n'),
-            c if is_hidden(c) => shown += &format!("\\u{:04x}", u32::from(c)),
+            c if is_hidden(c) => {
+                c.encode_utf16(&mut [0; 2]).iter().for_each(|unit| shown += &format!("\\u{unit:04x}"));
+            }
             c => shown.push(c),
         }
     }
     shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn escapes_change_no_string() {
+        let names = ["plain", "a\u{202e}b\u{e0041}\u{7f}", "two\nlines"];
+        let text = to_json(&names);
+        assert!(!text.contains(|c| is_hidden(c) && c != '\n'), "{text}");
+        assert_eq!(serde_json::from_str::<Vec<String>>(&text).unwrap(), names);
+    }
 }

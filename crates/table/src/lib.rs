@@ -19,7 +19,7 @@ pub use cell::{Cell, Content};
 pub use column::{Align, Column, Direction};
 pub use csv::{csv, csv_by_cell, text as csv_text};
 pub use digits::Digits;
-pub use escape::visible;
+pub use escape::{is_hidden, visible};
 pub use formats::{FORMATS, Format};
 pub use json::{json, to_json};
 pub use latex::latex;

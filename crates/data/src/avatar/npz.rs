@@ -3,7 +3,7 @@
 
 use super::super::npy::Array;
 use super::super::npz::Archive;
-use super::super::{Error, ply};
+use super::super::{Error, frames, ply};
 use super::start::Start;
 use super::{Canonical, CanonicalPose, Format, LoadedAvatar, Reader};
 use glam::{DVec3, Vec3};
@@ -152,12 +152,24 @@ fn logits(archive: &mut Archive) -> Result<Vec<f32>, Error> {
     }
 }
 
+/// What the brightest colour is stored as: 255 in bytes, else 1.
+fn full_colour(archive: &mut Archive, rgb: &Array) -> Result<f64, Error> {
+    if archive.header("rgb")?.descr.ends_with("u1") {
+        return Ok(255.0);
+    }
+    match rgb.values.iter().find(|c| !frames::PLAUSIBLE.contains(c)) {
+        None => Ok(1.0),
+        Some(c) => Err(archive.invalid("rgb", format!("a colour of {c}"), "0 to 1, or bytes (uint8)")),
+    }
+}
+
 /// `sh` (N, K, 3), or `rgb` (N, 3): the same from everywhere.
 fn colours(archive: &mut Archive, n: usize) -> Result<(usize, Vec<[f32; 3]>), Error> {
     let triple = |c: &[f64]| [0, 1, 2].map(|k: usize| c[k] as f32);
     match either(archive, ["sh", "rgb"], &["N,K,3", "N,3"])? {
         Err(rgb) if rgb.shape.len() == 2 => {
-            let band = |c: f64| (c - 0.5) / sh::C0;
+            let full = full_colour(archive, &rgb)?;
+            let band = |c: f64| (c / full - 0.5) / sh::C0;
             let coefficients: Vec<f64> = rgb.values.into_iter().map(band).collect();
             Ok((0, coefficients.chunks_exact(3).map(triple).collect()))
         }

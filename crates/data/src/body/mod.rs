@@ -5,6 +5,7 @@ mod smpl;
 
 pub use shape::shape;
 
+use super::error::disguise;
 use super::{Error, gltf, pickle, source};
 use skinsplat_core::scene::Body;
 use std::io::Read;
@@ -84,7 +85,7 @@ impl Format {
         } else if pickle::is_pickle_file(path, &start) {
             Ok(Self::Pickle)
         } else {
-            Err(Error::invalid(path, "file", "unknown format", expected))
+            Err(Error::invalid(path, "file", disguise(&start).unwrap_or("unknown format"), expected))
         }
     }
 }

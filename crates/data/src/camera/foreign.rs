@@ -2,7 +2,9 @@
 //! NeRF data sets.
 
 use super::super::Error;
-use super::CameraView;
+use super::fields::{self, Fields};
+use super::rigid::{self, RIGID};
+use super::{CameraView, NUMBER, PIXELS};
 use glam::{DMat3, DMat4, DVec3, DVec4};
 use serde::Deserialize;
 use serde_json::Value;
@@ -14,50 +16,48 @@ type Reader = fn(&Path, Value) -> Result<Vec<CameraView>, Error>;
 
 /// The reader of a file of another program; none if it is one of our own.
 pub(super) fn reader(value: &Value) -> Option<Reader> {
-    let is_trained =
-        |list: &[Value]| list.iter().all(|one| one.get("rotation").is_some() && one.get("fx").is_some());
+    let has = |one: &Value, names: &[&str]| names.iter().any(|name| one.get(name).is_some());
+    let of_training = |list: &[Value]| list.iter().any(|one| has(one, &["rotation", "position", "img_name"]));
     match value {
-        Value::Array(list) if !list.is_empty() && is_trained(list) => Some(trained),
+        Value::Array(list) if of_training(list) => Some(trained),
         Value::Object(fields) if !fields.contains_key("cameras") => {
-            let frames = fields.get("frames")?.as_array()?;
-            frames.iter().any(|frame| frame.get("transform_matrix").is_some()).then_some(nerf)
+            let frames = fields.get("frames").and_then(Value::as_array);
+            let placed =
+                frames.is_some_and(|frames| frames.iter().any(|one| has(one, &["transform_matrix"])));
+            (placed || has(value, &["fl_x", "camera_angle_x"])).then_some(nerf)
         }
         _ => None,
     }
 }
 
-/// A camera of 3DGS training: its place and axes in the world, OpenCV axes, the principal point in the middle.
-#[derive(Deserialize)]
-struct Trained {
-    width: u32,
-    height: u32,
-    position: [f64; 3],
-    /// Camera to world, rows.
-    rotation: [[f64; 3]; 3],
-    fx: f64,
-    fy: f64,
+fn trained(path: &Path, value: Value) -> Result<Vec<CameraView>, Error> {
+    let list = value.as_array().map(Vec::as_slice).unwrap_or_default();
+    list.iter().enumerate().map(|(i, camera)| trained_camera(path, i, camera)).collect()
 }
 
-fn trained(path: &Path, value: Value) -> Result<Vec<CameraView>, Error> {
-    let expected = "the cameras of 3DGS training: width, height, position, rotation (3x3), fx, fy";
-    let cameras: Vec<Trained> = serde_json::from_value(value)
-        .map_err(|cause| Error::invalid(path, "cameras", cause.to_string(), expected))?;
-    let view = |c: Trained| {
-        let axes = DMat3::from_cols_array_2d(&c.rotation).transpose();
-        let world_from_camera = placed(axes, DVec3::from_array(c.position));
-        let camera = Camera {
-            width: c.width,
-            height: c.height,
-            fx: c.fx,
-            fy: c.fy,
-            cx: 0.5 * f64::from(c.width),
-            cy: 0.5 * f64::from(c.height),
-            camera_from_world: world_from_camera.inverse(),
-        };
-        let note = "a camera of 3DGS training, whose file has no principal point: the middle of the image";
-        CameraView { camera, background: None, note: Some(note.to_owned()) }
+/// A camera of 3DGS training: its place and axes (camera to world, rows) in the world, OpenCV axes, the principal point in the
+/// middle.
+fn trained_camera(path: &Path, i: usize, value: &Value) -> Result<CameraView, Error> {
+    let format = "the cameras of 3DGS training: width, height, position, rotation (3x3), fx, fy";
+    let fields = Fields::of(path, &format!("cameras[{i}]"), value, format)?;
+    let (width, height) = (fields.required("width", PIXELS)?, fields.required("height", PIXELS)?);
+    let position: [f64; 3] = fields.required("position", "3 numbers")?;
+    let rotation: [[f64; 3]; 3] = fields.required("rotation", "3 rows of 3 numbers")?;
+    let axes = DMat3::from_cols_array_2d(&rotation).transpose();
+    if let Some(fault) = rigid::fault(axes) {
+        return Err(fields.invalid("rotation", fault, RIGID));
+    }
+    let camera = Camera {
+        width,
+        height,
+        fx: fields.required("fx", NUMBER)?,
+        fy: fields.required("fy", NUMBER)?,
+        cx: 0.5 * f64::from(width),
+        cy: 0.5 * f64::from(height),
+        camera_from_world: placed(axes, DVec3::from_array(position)).inverse(),
     };
-    Ok(cameras.into_iter().map(view).collect())
+    let note = "a camera of 3DGS training, whose file has no principal point: the middle of the image";
+    Ok(CameraView { camera, background: None, note: Some(note.to_owned()) })
 }
 
 fn placed(axes: DMat3, place: DVec3) -> DMat4 {
@@ -109,13 +109,17 @@ struct NerfFrame {
 fn nerf(path: &Path, value: Value) -> Result<Vec<CameraView>, Error> {
     let expected = "transforms.json of nerfstudio or instant-ngp: w, h, fl_x or camera_angle_x, frames of transform_matrix";
     let file: Nerf = serde_json::from_value(value)
-        .map_err(|cause| Error::invalid(path, "frames", cause.to_string(), expected))?;
+        .map_err(|cause| Error::invalid(path, "frames", fields::problem(&cause), expected))?;
     let view = |(i, frame): (usize, &NerfFrame)| {
         let lens = frame.lens.clone().or(&file.lens);
-        let world_from_camera = matrix(&frame.transform_matrix).ok_or_else(|| {
-            let field = format!("frames[{i}].transform_matrix");
-            Error::invalid(path, field, "another shape", "3 or 4 rows of 4 numbers")
-        })?;
+        let about_matrix = |problem: String, expected: &str| {
+            Error::invalid(path, format!("frames[{i}].transform_matrix"), problem, expected)
+        };
+        let world_from_camera = matrix(&frame.transform_matrix)
+            .ok_or_else(|| about_matrix("another shape".to_owned(), "3 or 4 rows of 4 numbers"))?;
+        if let Some(fault) = rigid::fault(DMat3::from_mat4(world_from_camera)) {
+            return Err(about_matrix(fault, RIGID));
+        }
         lens.view(world_from_camera).map_err(|(field, problem, expected)| {
             Error::invalid(path, format!("frames[{i}].{field}"), problem, expected)
         })
@@ -177,20 +181,30 @@ impl Lens {
         let fx = focal(self.fl_x, self.camera_angle_x, width);
         let fx =
             fx.ok_or(("fl_x", "missing, and camera_angle_x too".to_owned(), "a focal length in pixels"))?;
-        let fy = focal(self.fl_y, self.camera_angle_y, height).unwrap_or(fx);
+        let fy = focal(self.fl_y, self.camera_angle_y, height);
         let flipped = DMat4::from_diagonal(DVec4::new(1.0, -1.0, -1.0, 1.0));
         let camera = Camera {
             width,
             height,
             fx,
-            fy,
+            fy: fy.unwrap_or(fx),
             cx: self.cx.unwrap_or(0.5 * f64::from(width)),
             cy: self.cy.unwrap_or(0.5 * f64::from(height)),
             camera_from_world: (world_from_camera * flipped).inverse(),
         };
-        let distorted = self.distortion() != [0.0; 6];
-        let note = distorted.then(|| "the lens distortion of the file is left out".to_owned());
-        Ok(CameraView { camera, background: None, note })
+        Ok(CameraView { camera, background: None, note: self.note(fy.is_none()) })
+    }
+
+    /// What the file says and the camera leaves out, and what was guessed.
+    fn note(&self, guessed_fy: bool) -> Option<String> {
+        let clauses = [
+            (self.distortion() != [0.0; 6], "the lens distortion of the file is left out"),
+            (guessed_fy, "the file has no fl_y: that of fl_x"),
+            (self.cx.is_none(), "the file has no cx: the middle of the image"),
+            (self.cy.is_none(), "the file has no cy: the middle of the image"),
+        ];
+        let said: Vec<&str> = clauses.iter().filter(|(holds, _)| *holds).map(|(_, clause)| *clause).collect();
+        (!said.is_empty()).then(|| said.join("; "))
     }
 }
 

@@ -1,11 +1,15 @@
 //! Camera files: one camera as JSON, `transforms.json`, `cameras.npz`, and those of 3DGS and nerfstudio.
 
+mod fields;
 mod foreign;
+pub(crate) mod rigid;
 
 use super::npz::Archive;
 use super::{Error, error};
-use glam::DMat4;
-use serde::Deserialize;
+use fields::Fields;
+use glam::{DMat3, DMat4};
+use rigid::RIGID;
+use serde_json::Value;
 use skinsplat_core::scene::Camera;
 use std::path::Path;
 
@@ -16,17 +20,15 @@ pub struct CameraView {
     pub camera: Camera,
     /// Background colour, sRGB values in linear order R, G, B.
     pub background: Option<[f32; 3]>,
-    /// What the file says and the camera leaves out, or what was assumed: a clause.
+    /// What the file says and the camera leaves out, or what was assumed: a clause or several.
     pub note: Option<String>,
 }
-
-/// The arrays that are read of a `cameras.npz`.
-pub const ARRAYS: [&str; 6] = ["intrinsic", "K", "extrinsic", "w2c", "width", "height"];
 
 /// Loads every camera of a file; the content tells the form.
 ///
 /// # Errors
-/// Unknown forms, missing fields, skewed or inconsistent intrinsics, and whatever [`Camera::validate`] refuses.
+/// Unknown forms, missing fields, skewed or inconsistent intrinsics, axes that are no rotation, and whatever
+/// [`Camera::validate`] refuses.
 pub fn load(path: &Path) -> Result<Vec<Camera>, Error> {
     Ok(load_views(path)?.into_iter().map(|view| view.camera).collect())
 }
@@ -49,78 +51,73 @@ pub fn load_views(path: &Path) -> Result<Vec<CameraView>, Error> {
     Ok(views)
 }
 
-/// A camera file: OpenCV axes, pixel centres at +0.5, matrices row-major.
-#[derive(Deserialize)]
-struct Single {
-    width: u32,
-    height: u32,
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
-    world_to_camera: [[f64; 4]; 4],
-    background: Option<[f32; 3]>,
-}
-
-/// The part of `transforms.json` that holds cameras.
-#[derive(Deserialize)]
-struct Several {
-    cameras: Vec<Listed>,
-}
-
-#[derive(Deserialize)]
-struct Listed {
-    id: usize,
-    #[serde(rename = "K")]
-    k: [[f64; 3]; 3],
-    w2c: [[f64; 4]; 4],
-    width: u32,
-    height: u32,
-}
+/// What a JSON file of cameras may be.
+const FORMATS: &str = "a camera (width, height, fx, fy, cx, cy, world_to_camera), cameras.json of 3DGS training (a list of \
+                       width, height, position, rotation, fx, fy) or transforms.json (cameras, or frames of \
+                       transform_matrix)";
+const SINGLE: &str = "a camera: width, height, fx, fy, cx, cy, world_to_camera (4x4)";
+const LISTED: &str = "a camera of transforms.json: id, K (3x3), w2c (4x4), width, height";
+const PIXELS: &str = "a number of pixels";
+const NUMBER: &str = "a number";
+const MATRIX: &str = "4 rows of 4 numbers";
 
 fn load_json(path: &Path) -> Result<Vec<CameraView>, Error> {
-    let expected = "a camera: width, height, fx, fy, cx, cy, world_to_camera (4x4)";
-    let value: serde_json::Value = error::read_json(path, "camera", expected)?;
-    let malformed = |cause: serde_json::Error| Error::invalid(path, "camera", cause.to_string(), expected);
+    let value: Value = error::read_json(path, "camera", FORMATS)?;
     if let Some(read) = foreign::reader(&value) {
         return read(path, value);
     }
-    if value.get("cameras").is_none() {
-        let single: Single = serde_json::from_value(value).map_err(malformed)?;
-        if let Some(colour) = single.background.filter(|c| !c.iter().all(|v| (0.0..=1.0).contains(v))) {
-            let expected = "three sRGB values in [0, 1]";
-            return Err(Error::invalid(path, "background", format!("{colour:?}"), expected));
+    match (&value, value.get("cameras")) {
+        (Value::Object(_), None) => Ok(vec![single(path, &value)?]),
+        (_, Some(Value::Array(list))) => {
+            list.iter().enumerate().map(|(i, camera)| listed(path, i, camera)).collect()
         }
-        return Ok(vec![single.view()]);
+        (_, Some(other)) => Err(Error::invalid(path, "cameras", fields::kind(other), "a list of cameras")),
+        (other, None) => Err(Error::invalid(path, "camera", fields::kind(other), FORMATS)),
     }
-    let several: Several = serde_json::from_value(value).map_err(malformed)?;
-    let view = |(i, listed): (usize, &Listed)| {
-        if listed.id != i {
-            let expected = format!("{i} (cameras in order)");
-            return Err(Error::invalid(path, format!("cameras[{i}].id"), listed.id.to_string(), expected));
-        }
-        let k = listed.k.as_flattened();
-        let w2c = listed.w2c.as_flattened();
-        let camera = pinhole(k, w2c, listed.width, listed.height)
-            .map_err(|problem| Error::invalid(path, format!("cameras[{i}].K"), problem, INTRINSICS))?;
-        Ok(CameraView { camera, background: None, note: None })
-    };
-    several.cameras.iter().enumerate().map(view).collect()
 }
 
-impl Single {
-    fn view(self) -> CameraView {
-        let camera = Camera {
-            width: self.width,
-            height: self.height,
-            fx: self.fx,
-            fy: self.fy,
-            cx: self.cx,
-            cy: self.cy,
-            camera_from_world: DMat4::from_cols_array_2d(&self.world_to_camera).transpose(),
-        };
-        CameraView { camera, background: self.background, note: None }
+/// A camera file: OpenCV axes, pixel centres at +0.5, matrices row-major.
+fn single(path: &Path, value: &Value) -> Result<CameraView, Error> {
+    let fields = Fields::of(path, "", value, SINGLE)?;
+    let (width, height) = (fields.required("width", PIXELS)?, fields.required("height", PIXELS)?);
+    let number = |name| fields.required::<f64>(name, NUMBER);
+    let [fx, fy, cx, cy] = [number("fx")?, number("fy")?, number("cx")?, number("cy")?];
+    let camera_from_world = world_to_camera(&fields, "world_to_camera")?;
+    let expected = "three sRGB values in [0, 1]";
+    let background: Option<[f32; 3]> = fields.optional("background", expected)?;
+    if let Some(colour) = background.filter(|c| !c.iter().all(|v| (0.0..=1.0).contains(v))) {
+        return Err(fields.invalid("background", format!("{colour:?}"), expected));
     }
+    let camera = Camera { width, height, fx, fy, cx, cy, camera_from_world };
+    Ok(CameraView { camera, background, note: None })
+}
+
+/// A camera of the list in `transforms.json`.
+fn listed(path: &Path, i: usize, value: &Value) -> Result<CameraView, Error> {
+    let fields = Fields::of(path, &format!("cameras[{i}]"), value, LISTED)?;
+    let id: usize = fields.required("id", "a whole number")?;
+    if id != i {
+        return Err(fields.invalid("id", id.to_string(), &format!("{i} (cameras in order)")));
+    }
+    let k: [[f64; 3]; 3] = fields.required("K", INTRINSICS)?;
+    let (width, height) = (fields.required("width", PIXELS)?, fields.required("height", PIXELS)?);
+    let camera_from_world = world_to_camera(&fields, "w2c")?;
+    let camera = pinhole(k.as_flattened(), camera_from_world, width, height)
+        .map_err(|problem| fields.invalid("K", problem, INTRINSICS))?;
+    Ok(CameraView { camera, background: None, note: None })
+}
+
+/// A field of a transform into the axes of a camera.
+fn world_to_camera(fields: &Fields<'_>, name: &str) -> Result<DMat4, Error> {
+    let rows: [[f64; 4]; 4] = fields.required(name, MATRIX)?;
+    transform(rows.as_flattened()).map_err(|problem| fields.invalid(name, problem, RIGID))
+}
+
+/// The transform of these 16 numbers, row by row, whose linear part must be a rotation; else what it is.
+fn transform(rows: &[f64]) -> Result<DMat4, String> {
+    let rows: [f64; 16] = std::array::from_fn(|i| rows[i]);
+    let matrix = DMat4::from_cols_array(&rows).transpose();
+    rigid::fault(DMat3::from_mat4(matrix)).map_or(Ok(matrix), Err)
 }
 
 const INTRINSICS: &str = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]";
@@ -137,11 +134,17 @@ fn load_npz(path: &Path) -> Result<Vec<CameraView>, Error> {
     let extrinsics = archive.require(w2c_name, &format!("{batch}4,4"))?;
     let width = side(&mut archive, "width")?;
     let height = side(&mut archive, "height")?;
+    let read = [k_name, w2c_name, "width", "height"];
+    let unread: Vec<String> =
+        archive.names().into_iter().filter(|name| !read.contains(&name.as_str())).collect();
+    let note = (!unread.is_empty()).then(|| format!("not read: {}", unread.join(", ").escape_debug()));
     let view = |(i, (k, w2c)): (usize, (&[f64], &[f64]))| {
-        let field = if several { format!("{k_name}[{i}]") } else { k_name.to_owned() };
-        let camera =
-            pinhole(k, w2c, width, height).map_err(|problem| archive.invalid(field, problem, INTRINSICS))?;
-        Ok(CameraView { camera, background: None, note: None })
+        let field = |name: &str| if several { format!("{name}[{i}]") } else { name.to_owned() };
+        let camera_from_world =
+            transform(w2c).map_err(|problem| archive.invalid(field(w2c_name), problem, RIGID))?;
+        let camera = pinhole(k, camera_from_world, width, height)
+            .map_err(|problem| archive.invalid(field(k_name), problem, INTRINSICS))?;
+        Ok(CameraView { camera, background: None, note: note.clone() })
     };
     let pairs = intrinsics.values.chunks_exact(9).zip(extrinsics.values.chunks_exact(16));
     pairs.enumerate().map(view).collect()
@@ -151,16 +154,14 @@ fn side(archive: &mut Archive, name: &str) -> Result<u32, Error> {
     let scalar = archive.contains(name) && archive.header(name)?.shape.is_empty();
     let value = archive.require(name, if scalar { "" } else { "1" })?.values[0];
     if value.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&value) {
-        return Err(archive.invalid(name, format!("{value}"), "a number of pixels"));
+        return Err(archive.invalid(name, format!("{value}"), PIXELS));
     }
     Ok(value as u32)
 }
 
-fn pinhole(k: &[f64], w2c: &[f64], width: u32, height: u32) -> Result<Camera, String> {
+fn pinhole(k: &[f64], camera_from_world: DMat4, width: u32, height: u32) -> Result<Camera, String> {
     if [k[1], k[3], k[6], k[7], k[8]] != [0.0, 0.0, 0.0, 0.0, 1.0] {
         return Err(format!("skewed or not normalised: {k:?}"));
     }
-    let rows: [f64; 16] = std::array::from_fn(|i| w2c[i]);
-    let camera_from_world = DMat4::from_cols_array(&rows).transpose();
     Ok(Camera { width, height, fx: k[0], fy: k[4], cx: k[2], cy: k[5], camera_from_world })
 }

@@ -3,10 +3,11 @@
 use super::Channels;
 use crate::{Error, npy};
 use skinsplat_core::scene::camera;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
-/// Floats beyond this are no colours in \[0, 1\], not even those of an unclamped render.
-const BRIGHTEST: f64 = 32.0;
+/// Floats beyond these are no colours in \[0, 1\], not even those of an unclamped render.
+pub(crate) const PLAUSIBLE: RangeInclusive<f64> = -0.5..=8.0;
 
 /// (H, W, 3) or (H, W, 4).
 pub(super) fn image(path: &Path) -> Result<Channels, Error> {
@@ -17,7 +18,7 @@ pub(super) fn image(path: &Path) -> Result<Channels, Error> {
     };
     check_size(path, width, height)?;
     let (low, high) = range(&values);
-    if full.is_none() && (high > BRIGHTEST || low < -BRIGHTEST) {
+    if full.is_none() && !(PLAUSIBLE.contains(&low) && PLAUSIBLE.contains(&high)) {
         let problem = format!("floats from {low} to {high}");
         return Err(Error::invalid(
             path,
@@ -57,7 +58,15 @@ impl Stored {
         let (header, array) = npy::read_with_header(path)?;
         let full = match header.descr.get(1..).unwrap_or_default() {
             "u1" => Some(255.0),
-            "u2" => Some(65535.0),
+            "u2" => match range(&array.values).1 {
+                // Black, or the 8 bits of another type.
+                high if high > 1.0 && high <= 255.0 => {
+                    let problem = format!("type {}, values up to {high}", header.descr);
+                    let expected = "values up to 65535, or 8 bits as |u1";
+                    return Err(Error::invalid(path, "array", problem, expected));
+                }
+                _ => Some(65535.0),
+            },
             kind if kind.starts_with('u') || kind.starts_with('i') => match range(&array.values) {
                 // Wider integers hold what 8 bits hold.
                 (low, high) if low >= 0.0 && high <= 255.0 => Some(255.0),

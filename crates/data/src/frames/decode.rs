@@ -1,6 +1,7 @@
 //! PNG and JPEG files as channels.
 
 use super::{Channels, Error, IMAGE, error};
+use crate::jpeg_scan;
 use image::codecs::png::PngDecoder;
 use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage, ImageDecoder, RgbImage};
@@ -42,13 +43,18 @@ const PIXELS: u64 = 1 << 24;
 /// Pixels beyond those per byte of the file: photographs have less than twenty, drawings and masks are rarely so large.
 const PIXELS_PER_BYTE: u64 = 64;
 
-fn check_size(path: &Path, width: u32, height: u32, length: usize) -> Result<(), Error> {
+/// Of an image whose pixels become one value (grey) or three; alpha does not count.
+fn check_size(path: &Path, width: u32, height: u32, values: u64, length: usize) -> Result<(), Error> {
     camera::check_image_size(width, height).map_err(|refused| {
         Error::invalid(path, "image", format!("{}: {}", refused.field, refused.problem), refused.expected)
     })?;
-    if u64::from(width) * u64::from(height) > PIXELS + PIXELS_PER_BYTE * length as u64 {
+    // Grey takes a third of the memory.
+    let pixels = (PIXELS + PIXELS_PER_BYTE * length as u64) * 3 / values;
+    if u64::from(width) * u64::from(height) > pixels {
         let problem = format!("{width}x{height} pixels in {length} bytes");
-        let expected = format!("at most {PIXELS} pixels, and {PIXELS_PER_BYTE} more per byte of the file");
+        let expected = format!(
+            "at most {PIXELS} pixels, and {PIXELS_PER_BYTE} more per byte of the file; of grey three times as many"
+        );
         return Err(Error::invalid(path, "image size", problem, expected));
     }
     Ok(())
@@ -57,8 +63,8 @@ fn check_size(path: &Path, width: u32, height: u32, length: usize) -> Result<(),
 fn png(path: &Path, bytes: &[u8]) -> Result<Channels, Error> {
     let mut decoder = PngDecoder::new(Cursor::new(bytes)).map_err(|e| broken(path, e))?;
     let (width, height) = decoder.dimensions();
-    check_size(path, width, height, bytes.len())?;
-    let Stored { bits, samples } = Stored::of(bytes).ok_or_else(|| broken(path, "no header"))?;
+    let Stored { bits, samples, values } = Stored::of(bytes).ok_or_else(|| broken(path, "no header"))?;
+    check_size(path, width, height, values, bytes.len())?;
     let row = (u64::from(width) * u64::from(bits) * u64::from(samples)).div_ceil(8) + 1;
     if row * u64::from(height) > (bytes.len() as u64).saturating_mul(MAX_EXPANSION) {
         let problem = format!("{width}x{height} pixels in {} bytes", bytes.len());
@@ -85,19 +91,22 @@ struct Stored {
     bits: u8,
     /// Samples per pixel.
     samples: u8,
+    /// Values per pixel that they become, without alpha.
+    values: u64,
 }
 
 impl Stored {
     /// From the header, the first chunk of every PNG.
     fn of(bytes: &[u8]) -> Option<Self> {
-        let samples = match bytes.get(25)? {
-            0 | 3 => 1,
-            2 => 3,
-            4 => 2,
-            6 => 4,
+        let (samples, values) = match bytes.get(25)? {
+            0 => (1, 1),
+            3 => (1, 3),
+            2 => (3, 3),
+            4 => (2, 1),
+            6 => (4, 3),
             _ => return None,
         };
-        Some(Self { bits: *bytes.get(24)?, samples })
+        Some(Self { bits: *bytes.get(24)?, samples, values })
     }
 }
 
@@ -109,14 +118,16 @@ fn jpeg(path: &Path, bytes: &[u8]) -> Result<Channels, Error> {
     decoder.decode_headers().map_err(|e| broken(path, e))?;
     let (width, height) = decoder.dimensions().ok_or_else(|| broken(path, "no size"))?;
     let (width, height) = (width as u32, height as u32);
-    check_size(path, width, height, bytes.len())?;
     let grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
+    check_size(path, width, height, if grey { 1 } else { 3 }, bytes.len())?;
     let colours = if grey { ColorSpace::Luma } else { ColorSpace::RGB };
     decoder.set_options(decoder.options().jpeg_set_out_colorspace(colours));
     let pixels = undisturbed(path, || decoder.decode().map_err(|e| broken(path, e)))?;
     if !ends(bytes) {
         return Err(broken(path, "truncated: no end of the image"));
     }
+    // Decoders put grey where a damaged scan says nothing.
+    jpeg_scan::check(bytes).map_err(|damage| broken(path, damage))?;
     let orientation = decoder.exif().and_then(|exif| Orientation::from_exif_chunk(exif));
     let image = match grey {
         true => GrayImage::from_raw(width, height, pixels).map(DynamicImage::from),

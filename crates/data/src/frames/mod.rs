@@ -4,6 +4,7 @@ mod array;
 mod decode;
 
 use super::{Error, atomic, error, npy};
+pub(crate) use array::PLAUSIBLE;
 use decode::decode;
 use skinsplat_core::scene::{Image, Mask, SceneError};
 use std::path::Path;
@@ -30,11 +31,12 @@ pub(super) fn image_from_bytes(path: &Path, bytes: &[u8]) -> Result<(Image, Opti
 }
 
 /// Loads a mask with values in \[0, 1\]: a grey PNG or JPEG, or an `.npy` array (H, W) or (H, W, 1) of booleans, of 0 to 1 or of 0 to
-/// 255. Integers that are only 0 and 1 count as 0 and 1. A colour image is a mask if its channels are equal; an alpha
-/// channel is ignored.
+/// 255. Integers that are only 0 and 1 count as 0 and 1. A colour image is a mask if its channels are equal. Of grey and alpha the one
+/// that is not the same everywhere is the mask.
 ///
 /// # Errors
-/// As [`load_image`], for images of several colours, and for label maps: integers of which the largest is small.
+/// As [`load_image`], for images of several colours, whose grey and alpha are two masks, and for label maps: integers of which the
+/// largest is small.
 pub fn load_mask(path: &Path) -> Result<Mask, Error> {
     let channels = match is_npy(path) {
         true => array::mask(path)?,
@@ -46,19 +48,44 @@ pub fn load_mask(path: &Path) -> Result<Mask, Error> {
         let field = format!("pixel ({}, {})", i % width, i / width);
         return Err(Error::invalid(path, field, "a colour", "a grey mask"));
     }
-    let mut values: Vec<f32> = values.chunks_exact(count).map(|p| p[0]).collect();
+    let mut values = grey_or_alpha(path, &values, count)?;
     zero_and_one(path, &mut values, step)?;
     Mask::new(width, height, values).map_err(|e| Error::scene(path, e))
 }
 
+/// The grey values of a mask, or its alpha if only that says something.
+fn grey_or_alpha(path: &Path, values: &[f32], count: usize) -> Result<Vec<f32>, Error> {
+    let channel = |c: usize| -> Vec<f32> { values.chunks_exact(count).map(|p| p[c]).collect() };
+    let same = |values: &[f32]| values.iter().all(|v| Some(v) == values.first());
+    let grey = channel(0);
+    if count == 1 || count == 3 {
+        return Ok(grey);
+    }
+    let alpha = channel(count - 1);
+    if same(&alpha) {
+        return Ok(grey);
+    }
+    if same(&grey) {
+        return Ok(alpha);
+    }
+    let differ = grey.iter().zip(&alpha).filter(|(g, a)| (**g > 0.5) != (**a > 0.5)).count();
+    match differ * 100 <= grey.len() {
+        true => Ok(grey),
+        false => Err(Error::invalid(path, "mask", "grey and alpha are two masks", "one of them alone")),
+    }
+}
+
 /// Integers of at most this are labels, not coverages.
 const LARGEST_LABEL: f32 = 31.0;
+/// In 16 bits those of 8 are, too.
+const LARGEST_LABEL_OF_16_BITS: f32 = 255.0;
 
 /// Masks of 0 and 1 in integers of which the smallest is stored as `step` and the largest possible as 1.
 fn zero_and_one(path: &Path, values: &mut [f32], step: f32) -> Result<(), Error> {
     let high = values.iter().fold(0.0_f32, |high, &v| high.max(v));
     let integer = (high / step).round();
-    if step >= 1.0 || integer == 0.0 || integer > LARGEST_LABEL || high == 1.0 {
+    let largest = if step < 1e-3 { LARGEST_LABEL_OF_16_BITS } else { LARGEST_LABEL };
+    if step >= 1.0 || integer == 0.0 || integer > largest || high == 1.0 {
         return Ok(());
     }
     if integer > 1.0 {
@@ -172,13 +199,21 @@ struct Channels {
 
 impl Channels {
     fn into_image(self, path: &Path) -> Result<(Image, Option<Mask>), Error> {
-        let Self { width, height, count, values, .. } = self;
+        let Self { width, height, count, values, step } = self;
         let pixel = |p: &[f32]| if count < 3 { [p[0]; 3] } else { [p[0], p[1], p[2]] };
         let pixels = values.chunks_exact(count).map(pixel).collect();
         let scene = |e: SceneError| Error::scene(path, e);
         let image = Image::new(width, height, pixels).map_err(scene)?;
         let has_alpha = count == 2 || count == 4;
-        let alpha = has_alpha.then(|| values.chunks_exact(count).map(|p| p[count - 1]).collect());
+        let alpha: Option<Vec<f32>> =
+            has_alpha.then(|| values.chunks_exact(count).map(|p| p[count - 1]).collect());
+        // As masks: 0 and 1 of integers are no cover and full cover.
+        let alpha = alpha.map(|mut alpha| {
+            if step < 1.0 && alpha.iter().all(|a| *a <= step) {
+                alpha.iter_mut().for_each(|a| *a = (*a / step).round());
+            }
+            alpha
+        });
         let alpha = alpha.map(|values| Mask::new(width, height, values)).transpose().map_err(scene)?;
         Ok((image, alpha))
     }
@@ -193,6 +228,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn of_grey_and_alpha_the_one_that_says_something_is_the_mask() {
+        let read = |pairs: &[f32]| grey_or_alpha(Path::new("mask.png"), pairs, 2);
+        assert_eq!(read(&[1.0, 0.0, 1.0, 1.0]).unwrap(), [0.0, 1.0], "alpha");
+        assert_eq!(read(&[0.0, 1.0, 1.0, 1.0]).unwrap(), [0.0, 1.0], "grey");
+        assert_eq!(read(&[0.0, 0.1, 1.0, 0.9]).unwrap(), [0.0, 1.0], "both, alike");
+        assert!(read(&[0.0, 1.0, 1.0, 0.0]).unwrap_err().to_string().contains("two masks"));
+    }
+
+    #[test]
     fn labels_are_no_coverage() {
         let read = |values: &[f32], step: f32| {
             let mut values: Vec<f32> = values.iter().map(|v| v * step).collect();
@@ -205,6 +249,7 @@ mod tests {
         assert_eq!(read(&[0.0, 64.0], eight).unwrap(), [0.0, 64.0 * eight]);
         assert_eq!(read(&[0.0, 0.0], eight).unwrap(), [0.0, 0.0]);
         assert_eq!(read(&[0.0, 0.3], 1.0).unwrap(), [0.0, 0.3]);
+        assert!(read(&[0.0, 255.0], 1.0 / 65535.0).unwrap_err().to_string().contains("255 of 65535"));
         assert!(read(&[0.0, 3.0, 19.0], eight).unwrap_err().to_string().contains("19 of 255"));
     }
 }

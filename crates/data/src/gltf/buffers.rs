@@ -3,7 +3,8 @@
 use super::super::{Error, error, source};
 use super::text;
 use ::gltf::accessor::{DataType, Dimensions, Item, Iter};
-use ::gltf::json::validation::Checked;
+use ::gltf::json::Root;
+use ::gltf::json::validation::{self, Checked, Validate};
 use ::gltf::{Accessor, Document, buffer, image};
 use base64::Engine;
 use glam::Mat4;
@@ -25,6 +26,8 @@ pub(in super::super) struct Source {
     pub(super) document: Document,
     buffers: Vec<Vec<u8>>,
     folder: PathBuf,
+    /// The folder without links: of the document's name, and of the file behind it if that is a link. Buffers lie below one.
+    roots: Vec<PathBuf>,
     /// Bytes of the document and its buffers.
     pub(super) size: usize,
     /// What has to be said of the document.
@@ -51,10 +54,12 @@ impl Source {
         let mut root = text::parse(&json).map_err(named)?;
         let (required, notes) = text::check_extensions(&mut root).map_err(named)?;
         check_root(&root).map_err(named)?;
-        let document = Document::from_json(root).map_err(invalid)?;
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let document = validated(root).map_err(invalid)?;
+        let folder = folder_of(path);
         let size = bytes.len();
-        let mut source = Self { document, buffers: Vec::new(), folder, size, notes, required };
+        let roots = [folder.canonicalize(), path.canonicalize().map(|path| folder_of(&path))];
+        let roots = roots.into_iter().flatten().collect();
+        let mut source = Self { document, buffers: Vec::new(), folder, roots, size, notes, required };
         source.buffers = source.load_buffers(blob).map_err(named)?;
         source.size += source.buffers.iter().map(Vec::len).sum::<usize>();
         Ok(source)
@@ -78,7 +83,8 @@ impl Source {
         self.document.buffers().map(load).collect()
     }
 
-    /// The first `limit` bytes behind a `data:` URI or a path to a regular file below the document's folder.
+    /// The first `limit` bytes behind a `data:` URI or a path to a regular file below the document's folder, whichever links
+    /// there are on the way.
     fn resolve(&self, uri: &str, field: &str, limit: usize) -> Result<Vec<u8>, SceneError> {
         let broken = |problem: String| {
             let expected = "a path to a file in the document's folder, or a base64 data URI";
@@ -95,8 +101,9 @@ impl Source {
         let relative = urlencoding::decode(uri).map_err(|e| broken(e.to_string()))?;
         let relative = Path::new(relative.as_ref());
         let inside = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+        let leads_out = || broken(format!("{:?} leads out of the folder", shortened(uri)));
         if !relative.components().all(inside) {
-            return Err(broken(format!("{:?} leads out of the folder", shortened(uri))));
+            return Err(leads_out());
         }
         let path = self.folder.join(relative);
         let read = || {
@@ -105,7 +112,10 @@ impl Source {
             file.take(limit as u64).read_to_end(&mut bytes)?;
             Ok(bytes)
         };
-        read().map_err(|e: io::Error| broken(format!("{}: {e}", path.display())))
+        let unreadable = |e: io::Error| broken(format!("{}: {e}", path.display()));
+        let bytes = read().map_err(unreadable)?;
+        let target = path.canonicalize().map_err(unreadable)?;
+        if self.roots.iter().any(|root| target.starts_with(root)) { Ok(bytes) } else { Err(leads_out()) }
     }
 
     /// The object of KHR_gaussian_splatting of a primitive.
@@ -174,6 +184,9 @@ impl Source {
             return Err(SceneError::new(field, problem, format!("{:?} of {:?}", kind.1, kind.0)));
         }
         self.check_extents(accessor, field)?;
+        if accessor.view().is_none() && accessor.sparse().is_none() {
+            return Ok((0..accessor.count()).map(|_| T::zero()).collect());
+        }
         let data = |buffer: buffer::Buffer| self.buffers.get(buffer.index()).map(Vec::as_slice);
         Iter::new(accessor.clone(), data)
             .map(Iterator::collect)
@@ -223,11 +236,12 @@ impl Source {
     }
 
     fn check_extents(&self, accessor: &Accessor, field: &str) -> Result<(), SceneError> {
-        let view = accessor.view();
-        let Some(view) = view else {
-            return Err(SceneError::new(field, "no buffer view", "an accessor with data"));
-        };
-        self.check_extent(&view, accessor.offset(), accessor.count(), accessor.size(), field)?;
+        match accessor.view() {
+            Some(view) => {
+                self.check_extent(&view, accessor.offset(), accessor.count(), accessor.size(), field)?
+            }
+            None => self.check_zeros(accessor, field)?,
+        }
         if let Some(sparse) = accessor.sparse() {
             let (indices, values) = (sparse.indices(), sparse.values());
             let index_size = indices.index_type().size();
@@ -235,6 +249,17 @@ impl Source {
             self.check_extent(&values.view(), values.offset(), sparse.count(), accessor.size(), field)?;
         }
         Ok(())
+    }
+
+    /// An accessor without a buffer view is all zeros (glTF 2.0, 3.6.2.1), of which nothing in the file bounds the number.
+    fn check_zeros(&self, accessor: &Accessor, field: &str) -> Result<(), SceneError> {
+        let bytes = accessor.count().checked_mul(accessor.size());
+        if accessor.count() > 0 && bytes.is_some_and(|bytes| bytes <= self.size) {
+            return Ok(());
+        }
+        let problem = format!("{} items without a buffer view", accessor.count());
+        let expected = format!("at least one, and no more bytes of zeros than the file has ({})", self.size);
+        Err(SceneError::new(field, problem, expected))
     }
 
     /// `count` items of `size` bytes must lie within the view, and the view within its buffer.
@@ -268,8 +293,33 @@ impl Source {
     }
 }
 
+/// The folder that a path lies in, by a name that the system knows.
+fn folder_of(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(folder) if folder != Path::new("") => folder.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// The document, if it is what the crate takes for valid; accessors without a buffer view, which it refuses, are zeros.
+fn validated(root: Root) -> Result<Document, ::gltf::Error> {
+    let mut faults = Vec::new();
+    root.validate(&root, ::gltf::json::Path::new, &mut |path, fault| {
+        let path = path();
+        let without_view = |path: &str| path.starts_with("accessors[") && path.ends_with("].bufferView");
+        if fault != validation::Error::Missing || !without_view(path.as_str()) {
+            faults.push((path, fault));
+        }
+    });
+    if faults.is_empty() {
+        Ok(Document::from_json_without_validation(root))
+    } else {
+        Err(::gltf::Error::Validation(faults))
+    }
+}
+
 /// What the crate's own validation takes for granted.
-fn check_root(root: &::gltf::json::Root) -> Result<(), SceneError> {
+fn check_root(root: &Root) -> Result<(), SceneError> {
     if !root.asset.version.starts_with("2.") {
         return Err(SceneError::new("asset.version", &root.asset.version, "2.x"));
     }

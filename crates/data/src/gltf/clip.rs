@@ -13,6 +13,9 @@ use skinsplat_core::scene::{Pose, SceneError};
 /// No clip of more poses times joints than this is sampled at its keys.
 const MAX_SAMPLES: usize = 1 << 22;
 
+/// So many values of all channels together are read of any file; of a larger file one for each of its bytes.
+const FREE_VALUES: usize = 1 << 20;
+
 /// An animation of a rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clip {
@@ -59,6 +62,12 @@ impl Clip {
         times.sort_by(f64::total_cmp);
         times.dedup();
         times
+    }
+
+    /// The nodes whose scale moves, with the scales at the keys.
+    pub(super) fn scales(&self) -> impl Iterator<Item = (usize, impl Iterator<Item = DVec3>)> {
+        let scaling = self.channels.iter().filter(|channel| channel.property == Property::Scale);
+        scaling.map(|channel| (channel.node, (0..channel.times.len()).map(|k| channel.key(k).truncate())))
     }
 
     /// The pose at a time, in seconds. Before its first and after its last key a channel holds that key's value; nodes
@@ -149,18 +158,37 @@ impl Channel {
 
 /// All animations; channels of nodes outside the skeleton and of morph weights are left out.
 pub(super) fn collect(source: &Source, joints: &Joints) -> Result<Vec<Clip>, SceneError> {
-    let clip = |animation: ::gltf::Animation| {
+    let mut values = 0usize;
+    let mut clip = |animation: ::gltf::Animation| {
         let index = animation.index();
         let name = animation.name().map_or_else(|| format!("clip {index}"), str::to_owned);
         let channels = animation.channels().enumerate().filter_map(|(i, gltf_channel)| {
             let node = joints.index_of(&gltf_channel.target().node())?;
             let field = format!("animations[{index}].channels[{i}]");
             let moves = gltf_channel.target().property() != Property::MorphTargetWeights;
-            moves.then(|| channel(source, &gltf_channel, node, &field))
+            moves.then(|| {
+                values = values.saturating_add(size(&gltf_channel));
+                check_size(values, source, &field)?;
+                channel(source, &gltf_channel, node, &field)
+            })
         });
         Ok(Clip { name, channels: channels.collect::<Result<_, SceneError>>()? })
     };
-    source.document.animations().map(clip).collect()
+    source.document.animations().map(&mut clip).collect()
+}
+
+/// How many values a channel asks memory for.
+fn size(channel: &GltfChannel) -> usize {
+    channel.sampler().input().count().max(channel.sampler().output().count())
+}
+
+/// Accessors that channels repeat may not make clips grow beyond what the file could hold.
+fn check_size(values: usize, source: &Source, field: &str) -> Result<(), SceneError> {
+    if values <= source.size.max(FREE_VALUES) {
+        return Ok(());
+    }
+    let problem = format!("{values} values up to here, in a file of {} bytes", source.size);
+    Err(SceneError::new(field, problem, "channels that do not repeat an accessor over and over"))
 }
 
 fn channel(source: &Source, channel: &GltfChannel, node: usize, field: &str) -> Result<Channel, SceneError> {

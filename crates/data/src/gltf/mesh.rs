@@ -160,6 +160,7 @@ impl Part<'_> {
                 rows.iter_mut().zip(indices.iter().zip(&weights)).enumerate()
             {
                 for (&joint, &weight) in indices.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
+                    check_weight(weight, &weights_field, i)?;
                     let Some(&Some(joint)) = skeleton.get(usize::from(joint)) else {
                         let expected = format!("below the skin's {} joints", skeleton.len());
                         return Err(SceneError::new(
@@ -216,6 +217,14 @@ impl Part<'_> {
 
 fn widened<T: Into<u32>>(values: Vec<T>) -> Vec<u32> {
     values.into_iter().map(Into::into).collect()
+}
+
+fn check_weight(weight: f32, field: &str, vertex: usize) -> Result<(), SceneError> {
+    if weight.is_finite() && weight >= 0.0 {
+        return Ok(());
+    }
+    let expected = "a finite number, at least 0";
+    Err(SceneError::new(format!("{field}[{vertex}]"), format!("weight {weight}"), expected))
 }
 
 fn same_count(field: &str, found: usize, vertices: usize) -> Result<(), SceneError> {

@@ -4,6 +4,7 @@
 mod buffers;
 mod clip;
 mod mesh;
+mod scales;
 mod splats;
 mod text;
 mod write;
@@ -36,11 +37,13 @@ pub struct Rig {
 impl Rig {
     /// Loads a `.glb` or `.gltf` file, with its external buffers or data URIs. All meshes with a skin become one body,
     /// in the order of nodes and primitives. Weights that sum to 0.97 to 1.03 are divided by their sum, vertices without
-    /// weights hang on the first joint that they name, and channels without a node are ignored; the notes say so.
+    /// weights hang on the first joint that they name, and channels without a node are ignored; the notes say so, and
+    /// which joints mirror or scale by 0.
     ///
     /// # Errors
     /// An invalid document, compressed geometry, buffers or accessors that are missing or too short, a buffer that is no
-    /// regular file of the document's folder, no skinned mesh, weights of another sum, a node hierarchy that is no forest.
+    /// regular file of the document's folder, no skinned mesh, weights of another sum, a node hierarchy that is no forest,
+    /// clips of more values than the file has bytes (and than 2^20).
     pub fn load(path: &Path) -> Result<Self, Error> {
         let source = Source::open(path)?;
         let joints = Joints::collect(&source).map_err(|e| Error::scene(path, e))?;
@@ -57,6 +60,7 @@ impl Rig {
             pose_directions: Vec::new(),
         };
         rest.validate().map_err(|e| Error::scene(path, e))?;
+        notes.extend(scales::of_rest(&rest).map_err(|e| Error::scene(path, e))?);
         Ok(Self { body: Body { rest, shape: None }, clips, notes })
     }
 }

@@ -92,6 +92,11 @@ fn collect(source: &Source) -> Result<Splats, SceneError> {
             append(&mut all, gaussians, &part_field(mesh.index()))?;
         }
     }
+    let beside = nodes.iter().filter_map(Node::mesh).flat_map(|mesh| mesh.primitives().collect::<Vec<_>>());
+    let beside = beside.filter(|primitive| !is_splats(primitive)).count();
+    if beside > 0 && !skinned {
+        notes.push(format!("{beside} primitives without Gaussians beside them are not read"));
+    }
     if all.is_empty() {
         return Err(SceneError::new("meshes", "no node with KHR_gaussian_splatting", "Gaussians"));
     }
@@ -116,7 +121,15 @@ fn part_field(mesh: usize) -> String {
 
 /// True for a primitive of Gaussians.
 pub(super) fn is_splats(primitive: &Primitive<'_>) -> bool {
-    primitive.get(&Semantic::Extras(names::ROTATION.to_owned())).is_some()
+    own_attributes(primitive).next().is_some()
+}
+
+/// The attributes of a primitive that are the extension's.
+fn own_attributes<'p>(primitive: &'p Primitive<'_>) -> impl Iterator<Item = String> + 'p {
+    primitive.attributes().filter_map(|(semantic, _)| match semantic {
+        Semantic::Extras(name) if name.starts_with(names::EXTENSION) => Some(name),
+        _ => None,
+    })
 }
 
 /// The world transform of a node.
@@ -201,14 +214,20 @@ impl Part<'_> {
         let bands: Vec<Vec<[f32; 3]>> = (0..sh::count(sh_degree))
             .map(|k| self.vectors::<3>(&names::coefficient(k), Dimensions::Vec3))
             .collect::<Result<_, _>>()?;
+        self.note_unread(bands.len(), notes);
         let n = means.len();
-        let counts = [rotations.len(), scales.len(), opacities.len()];
-        if counts.iter().chain(bands.iter().map(Vec::len).collect::<Vec<_>>().iter()).any(|&count| count != n)
-        {
+        let counts = [
+            (names::ROTATION, rotations.len()),
+            (names::SCALE, scales.len()),
+            (names::OPACITY, opacities.len()),
+        ];
+        let bands_too = bands.iter().enumerate().map(|(k, band)| (names::coefficient(k), band.len()));
+        let mut all = counts.into_iter().map(|(name, count)| (name.to_owned(), count)).chain(bands_too);
+        if let Some((name, count)) = all.find(|(_, count)| *count != n) {
             return Err(SceneError::new(
-                &self.field,
-                "attributes of different lengths",
-                format!("{n} of each"),
+                format!("{}.{name}", self.field),
+                format!("{count} values"),
+                format!("{n}, as positions"),
             ));
         }
         for (i, opacity) in opacities.iter().enumerate() {
@@ -233,6 +252,22 @@ impl Part<'_> {
             sh_degree,
             sh: (0..n).flat_map(|i| bands.iter().map(move |band| band[i])).collect(),
         })
+    }
+
+    /// Says which attributes of the extension are not read, and how they would be drawn where that is not how they are here.
+    fn note_unread(&self, bands: usize, notes: &mut Vec<String>) {
+        let known: Vec<String> = [names::ROTATION, names::SCALE, names::OPACITY]
+            .map(str::to_owned)
+            .into_iter()
+            .chain((0..bands).map(names::coefficient))
+            .collect();
+        let unread: Vec<String> = own_attributes(&self.primitive)
+            .filter(|name| !known.contains(name))
+            .map(|name| name.escape_debug().to_string())
+            .collect();
+        if !unread.is_empty() {
+            notes.push(format!("{}: not read: {}", self.field, unread.join(", ")));
+        }
     }
 
     /// The highest degree of which all coefficients are there.
@@ -264,6 +299,13 @@ impl Part<'_> {
         if kernel != names::KERNEL {
             let field = format!("{}.{}.kernel", self.field, names::EXTENSION);
             return Err(SceneError::new(field, kernel.escape_debug().to_string(), "ellipse"));
+        }
+        for (key, own) in [("projection", "perspective"), ("sortingMethod", "cameraDistance")] {
+            let found = extension[key].as_str().unwrap_or(own);
+            if found != own {
+                let shown = found.chars().take(40).collect::<String>();
+                notes.push(format!("{key} {}: not read, drawn as {own}", shown.escape_debug()));
+            }
         }
         let space = extension["colorSpace"].as_str().unwrap_or(names::DISPLAY);
         if space != names::DISPLAY {

@@ -52,7 +52,7 @@ pub struct Request<'a> {
 pub const LAYOUTS: &[Layout] = &[
     Layout {
         id: "folder",
-        summary: "sequences train* and test*, each with transforms.json, or cameras.npz and poses.npz",
+        summary: "sequences train* and test*, each with transforms.json; exact numbers in cameras.npz and poses.npz",
         parts: &[],
         load: |request| Subject::load(request.folder, request.options),
     },

@@ -22,6 +22,7 @@
 //! 2ffefe2.
 
 use super::{Layout, Part as Place, Request};
+use crate::camera::rigid;
 use crate::digest::Fingerprint;
 use crate::folder::Subject;
 use crate::models::{Family, Gender, Models};
@@ -32,7 +33,7 @@ use crate::{
     Capture, Error, FrameGenerator, FrameRef, FrameSource, Sequence, Truth, depth, error, frames, image_size,
     listing, npy,
 };
-use glam::{DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 use skinsplat_core::scene::{Camera, Image, Mask};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -250,6 +251,9 @@ fn cameras(path: &Path, frames: usize, width: u32, rows: Rows) -> Result<Vec<Cam
             cy: k[5] - f64::from(rows.first),
             camera_from_world: DMat4::from_cols_array(&entries).transpose(),
         };
+        if let Some(fault) = rigid::fault(DMat3::from_mat4(camera.camera_from_world)) {
+            return Err(archive.invalid(format!("extrinsic[{i}]"), fault, rigid::RIGID));
+        }
         camera.validate().map_err(|mut e| {
             e.field = format!("extrinsic[{i}].{}", e.field);
             Error::scene(path, e)

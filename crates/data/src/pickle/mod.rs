@@ -117,6 +117,9 @@ fn start(file: &[u8]) -> Result<usize, SceneError> {
         let problem = format!("a pickle compressed with {name}, which is not read");
         return Err(SceneError::new("pickle", problem, "an uncompressed one (joblib.dump(..., compress=0))"));
     }
+    if let Some(found) = error::disguise(file) {
+        return Err(SceneError::new("pickle", found, "a Python pickle"));
+    }
     if !file.starts_with(npy::MAGIC) {
         return Ok(0);
     }

@@ -67,6 +67,7 @@ fn parse(bytes: &[u8]) -> Result<Stored, SceneError> {
     let (gaussians, dialect) = if compressed::is_packed(&rows) {
         (compressed::gaussians(&header, &mut rows, body)?, Dialect::Compressed)
     } else {
+        refuse_others(&header, &rows)?;
         let stored = gaussians(&mut rows, &mut notes)?;
         match activated::recognised(&stored) {
             true => (activated::standard(stored), Dialect::Activated),
@@ -86,6 +87,19 @@ fn parse(bytes: &[u8]) -> Result<Stored, SceneError> {
     let body =
         header.comments.iter().find_map(|c| c.strip_prefix(super::write::BODY_COMMENT)).map(str::to_owned);
     Ok(Stored { avatar, dialect, encoding: header.encoding, body, comments: header.comments, ignored, notes })
+}
+
+/// Refuses what has nothing of a Gaussian but its place.
+fn refuse_others(header: &Header, rows: &Rows<'_>) -> Result<(), SceneError> {
+    let has = |names: &[&str]| names.iter().filter(|name| rows.has(name)).count();
+    if has(&["x", "y", "z"]) < 3 || has(&["scale_0", "rot_0", "opacity", "f_dc_0"]) > 0 {
+        return Ok(());
+    }
+    let surface = ["face", "tristrips"];
+    let is_mesh = header.elements.iter().any(|element| surface.contains(&element.name.as_str()));
+    let problem = if is_mesh { "a mesh, not Gaussians" } else { "a point cloud, not Gaussians" };
+    let expected = "x y z, f_dc_*, opacity, scale_* and rot_* of each vertex, as 3DGS writes them";
+    Err(SceneError::new("element vertex", problem, expected))
 }
 
 /// What the comments of Brush, splat-transform and Postshot say of the rasterizer.

@@ -1,9 +1,10 @@
 //! Poses as axis-angle vectors by part, and the joints that they become.
 
+use super::FARTHEST;
 use super::part::{Family, Part};
 use crate::{Error, SourceDigest, Sourced, digest::Fingerprint};
 use glam::DVec3;
-use skinsplat_core::scene::{HandSpace, Pose, Skeleton};
+use skinsplat_core::scene::{HandSpace, LocalTransform, Pose, Skeleton};
 use std::path::Path;
 
 /// What hand poses are relative to: `flat_hand_mean` of the smplx package.
@@ -60,6 +61,13 @@ impl Track {
         self.values.chunks_exact(self.width.max(1)).all(rest)
     }
 
+    /// The rows of both, one behind the other.
+    pub(super) fn beside(&self, right: &Self) -> Vec<f64> {
+        let rows =
+            self.values.chunks_exact(self.width.max(1)).zip(right.values.chunks_exact(right.width.max(1)));
+        rows.flat_map(|(left, right)| left.iter().chain(right).copied()).collect()
+    }
+
     /// The joints from `first` on as a track of their own.
     fn cut(&self, part: Part, range: std::ops::Range<usize>) -> Self {
         let columns = 3 * range.start..3 * range.end;
@@ -76,6 +84,16 @@ impl Angles {
 
     pub(super) fn num_joints(&self) -> usize {
         self.tracks.iter().map(|t| if t.principal { 15 } else { t.joints() }).sum()
+    }
+
+    /// True if one array has all joints.
+    pub(super) fn is_whole(&self) -> bool {
+        self.tracks.iter().any(|track| track.part == Part::Whole)
+    }
+
+    /// The parts, also those of one array of all joints in an order that is known.
+    pub(super) fn parts(&self) -> Vec<Track> {
+        self.tracks.iter().flat_map(|t| t.split().unwrap_or_else(|| vec![t.clone()])).collect()
     }
 
     /// Adds the frames of another motion; false if it has other parts.
@@ -97,7 +115,15 @@ impl Angles {
 
     /// The poses for a skeleton, and the digest of the numbers behind them.
     pub(super) fn poses(&self, path: &Path, skeleton: &Skeleton) -> Result<Sourced<Vec<Pose>>, Error> {
+        self.fit_into_memory(path, skeleton)?;
         let Placed { rotations, .. } = self.placed(path, skeleton)?;
+        for (frame, own) in rotations.iter().enumerate() {
+            if let Some(angle) = own.iter().find(|axis| axis.abs().max_element() > FARTHEST) {
+                let problem = format!("an angle of {:e}", angle.abs().max_element());
+                let expected = format!("radians, at most {FARTHEST:e}");
+                return Err(Error::invalid(path, format!("poses[{frame}]"), problem, expected));
+            }
+        }
         let pose = |(frame, own): (usize, &Vec<DVec3>)| {
             let mut pose = Pose::from_axis_angles(skeleton, own, self.translations[frame]);
             if let Some(&scale) = self.scales.get(frame) {
@@ -107,6 +133,21 @@ impl Angles {
         };
         let poses = rotations.iter().enumerate().map(pose).collect();
         Ok(Sourced::computed(poses, self.digest(&rotations)))
+    }
+
+    /// Refuses more poses than a file of its length should become: zeros compress a thousandfold.
+    fn fit_into_memory(&self, path: &Path, skeleton: &Skeleton) -> Result<(), Error> {
+        /// What a joint of a pose takes on its way, bytes.
+        const JOINT: u64 = (size_of::<LocalTransform>() + 2 * size_of::<DVec3>()) as u64;
+        let bytes = (self.len() * skeleton.num_joints()) as u64 * JOINT;
+        let length =
+            path.metadata().map_or(u64::MAX, |file| if file.is_file() { file.len() } else { u64::MAX });
+        let most = length.saturating_mul(1032).saturating_add(1 << 26);
+        if bytes <= most {
+            return Ok(());
+        }
+        let problem = format!("{} of {} joints, {bytes} bytes in memory", self.len(), skeleton.num_joints());
+        Err(Error::invalid(path, "poses", problem, format!("at most {most} bytes of a file of its length")))
     }
 
     /// What a skeleton makes of the parts that has to be said.

@@ -26,7 +26,7 @@ use super::{Error, SourceDigest, Sourced, error, gltf};
 use angles::{Angles, Track};
 use glam::DVec3;
 use serde::Deserialize;
-use skinsplat_core::scene::{Pose, Skeleton};
+use skinsplat_core::scene::{LocalTransform, Pose, Skeleton};
 use std::path::{Path, PathBuf};
 
 /// Poses as a file holds them. They become [`Pose`]s for a skeleton, whose rest offsets may follow from `betas` and
@@ -56,6 +56,21 @@ enum Keys {
 
 /// Most poses of a file of angles: a small archive may hold many, all alike.
 const MAX_POSES: usize = 1 << 18;
+
+/// Farther translations (metres), larger scales and wider angles (radians) are no poses of a body: posed, they overflow 32 bits or mean nothing.
+pub const FARTHEST: f64 = 1e6;
+
+/// The first number of a pose that is beyond [`FARTHEST`] or not finite, and what it is.
+fn beyond(pose: &Pose) -> Option<(&'static str, f64)> {
+    let out = |v: &f64| v.is_nan() || v.abs() > FARTHEST;
+    let of = |what, values: &[f64]| Some((what, *values.iter().find(|v| out(v))?));
+    let local = |local: &LocalTransform| {
+        of("translation", &local.translation.to_array())
+            .or_else(|| of("rotation", &local.rotation.to_array()))
+            .or_else(|| of("scale", &local.scale.to_array()))
+    };
+    of("translation", &pose.translation.to_array()).or_else(|| pose.locals.iter().find_map(local))
+}
 
 impl PoseTrack {
     /// A track of axis-angle values (radians) by part, frame after frame, with a translation (metres) per frame; either
@@ -230,8 +245,20 @@ impl PoseTrack {
     ///
     /// # Errors
     /// More joints in the file than in a skeleton of another family, hands by principal coefficients for a model without
-    /// components, or nodes of a glTF clip that the skeleton does not have.
+    /// components, nodes of a glTF clip that the skeleton does not have, or numbers that no body survives ([`FARTHEST`]).
     pub fn poses(&self, skeleton: &Skeleton) -> Result<Sourced<Vec<Pose>>, Error> {
+        let poses = self.poses_of(skeleton)?;
+        match poses.iter().enumerate().find_map(|(frame, pose)| Some((frame, beyond(pose)?))) {
+            None => Ok(poses),
+            Some((frame, (what, number))) => {
+                let expected = format!("finite angles, and {what}s of at most {FARTHEST:e}");
+                let problem = format!("a {what} of {number:e}");
+                Err(Error::invalid(&self.path, format!("poses[{frame}]"), problem, expected))
+            }
+        }
+    }
+
+    fn poses_of(&self, skeleton: &Skeleton) -> Result<Sourced<Vec<Pose>>, Error> {
         match &self.keys {
             Keys::Angles(angles) => angles.poses(&self.path, skeleton),
             Keys::Nodes { names, poses, source } if *names == skeleton.names => {
@@ -286,9 +313,10 @@ pub fn load_clip(path: &Path, clip: Option<&str>) -> Result<PoseTrack, Error> {
         let clip = rig.clip(clip).map_err(|e| Error::scene(path, e))?;
         let poses = clip.key_poses(&rig).map_err(|e| Error::scene(path, e))?;
         let source = clip.digest(&rig);
+        let notes = [rig.notes.clone(), clip.notes(&rig)].concat();
         let keys = Keys::Nodes { names: rig.body.rest.skeleton.names, poses, source };
         let mut track = PoseTrack::of(path, Vec::new(), keys);
-        track.notes = rig.notes;
+        track.notes = notes;
         return Ok(track);
     }
     match clip {

@@ -45,6 +45,7 @@ pub(super) fn load(path: &Path) -> Result<PoseTrack, Error> {
         notes.push(format!("not read: {}", unread.join(", ")));
     }
     contradictions(&mut file, &mut notes)?;
+    passed_over(&mut file, &angles, &mut notes)?;
     let framerate = first(&file, names::FRAMERATE)
         .and_then(|name| file.array(name).ok().flatten()?.values.first().copied());
     let gender =
@@ -69,6 +70,42 @@ fn contradictions(file: &mut Arrays, notes: &mut Vec<String>) -> Result<(), Erro
             if file.array(read)?.map(|array| array.values) != file.array(other)?.map(|array| array.values) {
                 notes.push(format!("{other}: not read, as {read} is there too and holds other numbers"));
             }
+        }
+    }
+    Ok(())
+}
+
+/// Says which parts are passed over because one array has all of them, or because the left and the right one are there, where they
+/// hold other numbers.
+fn passed_over(file: &mut Arrays, angles: &Angles, notes: &mut Vec<String>) -> Result<(), Error> {
+    let known: Vec<String> = file.names();
+    let there =
+        |names: &[&'static str]| names.iter().copied().find(|name| known.iter().any(|own| own == name));
+    let others =
+        names::PARTS.iter().map(|(_, names)| *names).chain(names::PAIRS.iter().map(|(.., names)| *names));
+    if others.filter(|names| there(names).is_some()).count() + usize::from(angles.is_whole())
+        <= angles.tracks.len()
+    {
+        return Ok(());
+    }
+    let parts = angles.parts();
+    let of = |part: Part| parts.iter().find(|track| track.part == part);
+    let mut compare = |name: &str, read: Option<Vec<f64>>| -> Result<(), Error> {
+        let values = file.array(name)?.map(|array| array.values).unwrap_or_default();
+        // A part that is not in the other array rests.
+        if read.map_or(values.iter().any(|v| *v != 0.0), |read| read != values) {
+            notes.push(format!("{name}: not read, as another array has the part, with other numbers"));
+        }
+        Ok(())
+    };
+    for (part, names) in names::PARTS {
+        if let Some(name) = there(names) {
+            compare(name, of(part).map(|track| track.values.clone()))?;
+        }
+    }
+    for (left, right, names) in names::PAIRS {
+        if let Some(name) = there(names) {
+            compare(name, of(left).zip(of(right)).map(|(left, right)| left.beside(right)))?;
         }
     }
     Ok(())

@@ -11,6 +11,13 @@ const CAMERA: &str = r#"{
   "world_to_camera": [[1, 0, 0, 0.5], [0, -1, 0, 1.5], [0, 0, -1, 3], [0, 0, 0, 1]], "background": [0.1, 0.2, 0.3]
 }"#;
 
+const LISTED: &str = r#"{ "cameras": [{ "id": 0, "width": 8, "height": 6, "K": [[9, 0, 4], [0, 9, 3], [0, 0, 1]],
+  "w2c": [[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]] }] }"#;
+const TRAINED: &str = r#"[{ "id": 0, "img_name": "0001", "width": 64, "height": 48, "fx": 60, "fy": 60,
+  "position": [0, 0, -3], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }]"#;
+const NERF: &str = r#"{ "w": 64, "h": 48, "fl_x": 60, "frames": [{ "file_path": "a.png",
+  "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]] }] }"#;
+
 fn text(folder: &Path, name: &str, text: &str) -> PathBuf {
     let path = folder.join(name);
     std::fs::write(&path, text).unwrap();
@@ -54,18 +61,43 @@ fn what_is_wrong_with_a_camera_is_named() {
         (CAMERA.replace("\"width\": 640", "\"width\": 4000000000"), "width"),
         (CAMERA.replace("\"width\": 640", "\"width\": 32768"), "width"),
         (CAMERA.replace("640", "16384").replace("480", "16384"), "size"),
-        (CAMERA.replace("\"width\": 640, ", ""), "camera"),
+        (CAMERA.replace("\"width\": 640, ", ""), "width"),
+        (CAMERA.replace("640", "\"wide\""), "width"),
+        (CAMERA.replace("[0.1, 0.2, 0.3]", "[1, 1]"), "background"),
+        (CAMERA.replace("[1, 0, 0, 0.5]", "[3, 0, 0, 0.5]"), "world_to_camera"),
+        (CAMERA.replace("[1, 0, 0, 0.5]", "[-1, 0, 0, 0.5]"), "world_to_camera"),
+        (CAMERA.replace("[1, 0, 0, 0.5]", "[1, 0.02, 0, 0.5]"), "world_to_camera"),
         (CAMERA.replace("[0, 0, -1, 3]", "[0, 0, 0, 3]"), "world_to_camera"),
         (CAMERA.replace("[0, 0, 0, 1]", "[0, 0, 1, 1]"), "world_to_camera"),
-        (CAMERA.replace("[0, 0, -1, 3]", "[0, 0, -1]"), "camera"),
+        (CAMERA.replace("[0, 0, -1, 3]", "[0, 0, -1]"), "world_to_camera"),
         (CAMERA.replace('}', ""), "camera"),
         ("[]".to_owned(), "camera"),
+        ("3".to_owned(), "camera"),
+        (r#"[{"a": 1}]"#.to_owned(), "camera"),
+        (format!(r#"{{"cameras": {{"a": {CAMERA}}}}}"#), "cameras"),
+        (format!(r#"{{"cameras": [{CAMERA}]}}"#), "cameras[0].id"),
+        (LISTED.replace("[1, 0, 0, 0.5]", "[2, 0, 0, 0.5]"), "cameras[0].w2c"),
+        (LISTED.replace("[9, 0, 4]", "[9, 1, 4]"), "cameras[0].K"),
+        (TRAINED.replace("\"fx\": 60, ", ""), "cameras[0].fx"),
+        (TRAINED.replace("\"rotation\"", "\"turn\""), "cameras[0].rotation"),
+        (TRAINED.replace("[1, 0, 0]", "[5, 0, 0]"), "cameras[0].rotation"),
+        (NERF.replace("[1, 0, 0, 0]", "[7, 0, 0, 0]"), "frames[0].transform_matrix"),
+        (NERF.replace("frames", "pictures"), "frames"),
     ];
     for (json, field) in cases {
         let path = text(folder.path(), "camera.json", &json);
         let error = camera::load(&path).unwrap_err();
         assert_eq!((error.field(), error.path()), (field, path.as_path()), "{error}");
-        assert_eq!(error.to_string().lines().count(), 1, "{error}");
+        let line = error.to_string().replace(path.to_str().unwrap(), "");
+        assert!(line.lines().count() == 1 && line.contains("; expected "), "{line}");
+        assert!(!["u32", "f64", "struct", "map"].iter().any(|word| line.contains(word)), "{line}");
+    }
+    let scaled =
+        CAMERA.replace("[1,", "[2,").replace("0, -1, 0, 1.5", "0, -2, 0, 1.5").replace("-1, 3]", "-2, 3]");
+    let error = camera::load(&text(folder.path(), "camera.json", &scaled)).unwrap_err().to_string();
+    assert!(error.contains("a rotation times 2.0000: of a world in other units"), "{error}");
+    for good in [LISTED, TRAINED, NERF, &CAMERA.replace("[1, 0, 0, 0.5]", "[1, 0.002, 0, 0.5]")] {
+        camera::load(&text(folder.path(), "camera.json", good)).unwrap();
     }
     let k = Values::F64(vec![700., 2., 320., 0., 700., 240., 0., 0., 1.]);
     let mut w2c = vec![0.0; 16];
@@ -82,6 +114,45 @@ fn what_is_wrong_with_a_camera_is_named() {
         ],
     );
     assert_eq!(camera::load(&path).unwrap_err().field(), "K");
+    let flat = |matrix: &[f64]| Values::F64(matrix.to_vec());
+    let k = [700., 0., 320., 0., 700., 240., 0., 0., 1.];
+    let mut mirrored = [0.0; 16];
+    [0, 5, 10, 15].iter().for_each(|&i| mirrored[i] = if i == 0 { -1.0 } else { 1.0 });
+    let sides = [("width", &[][..], side()), ("height", &[][..], side())];
+    let [width, height] = sides;
+    files::npz(&path, &[("K", &[3, 3], flat(&k)), ("w2c", &[4, 4], flat(&mirrored)), width, height]);
+    let error = camera::load(&path).unwrap_err();
+    assert!(error.field() == "w2c" && error.to_string().contains("a mirror image"), "{error}");
+}
+
+#[test]
+fn what_a_camera_leaves_out_or_guesses_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let note = |json: &str| {
+        camera::load_views(&text(folder.path(), "camera.json", json))
+            .unwrap()
+            .remove(0)
+            .note
+            .unwrap_or_default()
+    };
+    let guesses = ["no fl_y", "no cx", "no cy"];
+    assert!(guesses.iter().all(|guess| note(NERF).contains(guess)), "{}", note(NERF));
+    let complete = NERF.replace("\"w\": 64", "\"fl_y\": 60, \"cx\": 32, \"cy\": 24, \"w\": 64");
+    assert_eq!(note(&complete), "");
+    let path = folder.path().join("cameras.npz");
+    let identity =
+        |n: usize| Values::F64((0..n * n).map(|i| f64::from(u8::from(i % (n + 1) == 0))).collect());
+    let side = || Values::I64(vec![64]);
+    let fields = [
+        ("K", &[3, 3][..], identity(3)),
+        ("w2c", &[4, 4], identity(4)),
+        ("width", &[], side()),
+        ("height", &[], side()),
+        ("dist", &[5], Values::F64(vec![0.1; 5])),
+    ];
+    files::npz(&path, &fields);
+    let views = camera::load_views(&path).unwrap();
+    assert_eq!(views[0].note.as_deref(), Some("not read: dist"));
 }
 
 /// How the one row of a PNG is stored.
@@ -165,7 +236,7 @@ fn images_are_written_rounded_to_8_bits_or_exactly() {
         "alpha"
     );
 
-    let finite = Image::new(2, 1, vec![[0.1, -1.0, 7.25], [0.2, 1e-40, 0.3]]).unwrap();
+    let finite = Image::new(2, 1, vec![[0.1, -0.25, 7.25], [0.2, 1e-40, 0.3]]).unwrap();
     let npy = folder.path().join("image.npy");
     frames::save_npy(&npy, &finite).unwrap();
     assert_eq!(frames::load_image(&npy).unwrap(), (finite, None));

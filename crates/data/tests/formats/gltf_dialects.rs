@@ -23,7 +23,14 @@ fn what_is_wrong_with_a_rig_is_named() {
         (|j| j["accessors"][0]["byteOffset"] = json!(8), "meshes[0].primitives[0].POSITION"),
         (|j| j["bufferViews"][0]["byteLength"] = json!(1u64 << 40), "meshes[0].primitives[0].POSITION"),
         (|j| j["bufferViews"][0]["byteStride"] = json!(8), "meshes[0].primitives[0].POSITION"),
-        (|j| drop(j["accessors"][0].as_object_mut().unwrap().remove("bufferView")), "glTF"),
+        (
+            |j| {
+                j["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+                j["accessors"][0]["count"] = json!(4_000_000_000u64);
+            },
+            "meshes[0].primitives[0].POSITION",
+        ),
+        (|j| j["accessors"][0]["bufferView"] = json!(99), "glTF"),
         (|j| j["accessors"][1]["count"] = json!(2), "meshes[0].primitives[0].TEXCOORD_0"),
         (|j| j["accessors"][4]["count"] = json!(2), "meshes[0].primitives[0].indices"),
         (|j| j["accessors"][2]["componentType"] = json!(F32), "meshes[0].primitives[0].JOINTS_0"),
@@ -61,6 +68,12 @@ fn what_is_wrong_with_a_rig_is_named() {
     heavy.json["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = json!(weights);
     let error = body::load(&heavy.glb(folder.path())).unwrap_err();
     assert_eq!(error.field(), "meshes[0].primitives[0].WEIGHTS_0[1]", "{error}");
+    for weight in [-0.25, f32::NEG_INFINITY, f32::NAN] {
+        let b = with_weights(&[1., 0., 0., 0., 1., 0., 0., 0., 1.25, weight, 0., 0.]);
+        let error = body::load(&b.glb(folder.path())).unwrap_err();
+        assert_eq!(error.field(), "meshes[0].primitives[0].WEIGHTS_0[2]", "{error}");
+        assert!(error.to_string().contains(&format!(": weight {weight}; ")), "{error}");
+    }
     for (times, values, field) in [
         (&[1.0f32, 1.0][..], &[0.0f32; 6][..], "animations[0].channels[0].input"),
         (&[0.0, f32::NAN], &[0.0; 6], "animations[0].channels[0].input"),
@@ -218,5 +231,88 @@ fn buffers_are_files_of_the_folder() {
     {
         std::os::unix::fs::symlink("/dev/zero", inner.join("endless.bin")).unwrap();
         assert!(load("endless.bin").unwrap_err().to_string().contains("not a regular file"));
+        use std::os::unix::fs::symlink;
+        symlink(folder.path().join("outside.bin"), inner.join("out.bin")).unwrap();
+        let error = load("out.bin").unwrap_err().to_string();
+        assert!(error.contains("buffers[0].uri") && error.contains("leads out of the folder"), "{error}");
+        symlink("parts/rig.bin", inner.join("near.bin")).unwrap();
+        load("near.bin").unwrap();
+        // The folder, or the document, may be a link itself.
+        symlink(&inner, folder.path().join("linked")).unwrap();
+        let expected = body::load(&inner.join("rig.gltf")).unwrap();
+        assert_eq!(body::load(&folder.path().join("linked/rig.gltf")).unwrap(), expected);
+        let cache = folder.path().join("cache");
+        std::fs::create_dir(&cache).unwrap();
+        symlink(inner.join("rig.gltf"), cache.join("rig.gltf")).unwrap();
+        symlink(inner.join("near.bin"), cache.join("near.bin")).unwrap();
+        assert_eq!(body::load(&cache.join("rig.gltf")).unwrap(), expected);
     }
+}
+
+/// Accessors without data are zeros, with or without sparse values; as many as the file has bytes.
+#[test]
+fn accessors_without_a_view_are_zeros() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut b = arm();
+    let index = b.accessor(U8, "SCALAR", 1, &[1]);
+    let value = b.floats("VEC3", 1, &[4., 5., 6.]);
+    let view = |accessor: usize| b.json["accessors"][accessor]["bufferView"].clone();
+    let sparse = json!({ "count": 1, "indices": { "bufferView": view(index), "componentType": U8 },
+        "values": { "bufferView": view(value) } });
+    let path = folder.path().join("zeros.glb");
+    let load = |edit: &dyn Fn(&mut Value)| {
+        let mut json = b.document();
+        json["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+        edit(&mut json["accessors"][0]);
+        files::glb(&path, &json, &b.binary);
+        body::load(&path).map(|body| body.rest.vertices)
+    };
+    assert_eq!(load(&|_| ()).unwrap(), [glam::DVec3::ZERO; 3]);
+    let filled = load(&|accessor| accessor["sparse"] = sparse.clone()).unwrap();
+    assert_eq!(filled, [glam::DVec3::ZERO, glam::DVec3::new(4.0, 5.0, 6.0), glam::DVec3::ZERO]);
+    assert!(load(&|accessor| accessor["count"] = json!(1 << 20)).is_err());
+}
+
+/// Clips of many channels over one accessor take no more memory than the file could hold.
+#[test]
+fn clips_that_repeat_an_accessor_over_and_over_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut b = arm();
+    let times: Vec<f32> = (0..2000u16).map(f32::from).collect();
+    b.channel("clip", 0, "rotation", "LINEAR", &times, &[0., 0., 0., 1.].repeat(2000));
+    let clip = b.json["animations"][0].clone();
+    b.json["animations"] = json!(vec![clip.clone(); 200]);
+    let rig = Rig::load(&b.glb(folder.path())).unwrap();
+    assert!(rig.clips.iter().all(|clip| clip.key_times().len() == 2000) && rig.clips.len() == 200);
+    b.json["animations"] = json!(vec![clip; 600]);
+    let error = Rig::load(&b.glb(folder.path())).unwrap_err();
+    assert_eq!(error.field(), "animations[524].channels[0]", "{error}");
+    assert!(error.to_string().contains("over and over"), "{error}");
+}
+
+#[test]
+fn joints_that_mirror_or_scale_by_0_are_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let load = |b: &Builder| Rig::load(&b.glb(folder.path())).unwrap();
+    let mirrored = "mirrored, which the shape of Gaussians does not follow (covariance=affine does)";
+    let mut b = arm();
+    b.json["nodes"][0]["scale"] = json!([1, -1, 1]);
+    b.channel("same", 0, "scale", "LINEAR", &[0., 1.], &[1., -1., 1., 2., -2., 2.]);
+    b.channel("back", 0, "scale", "LINEAR", &[0., 1.], &[1., -1., 1., 1., 1., 1.]);
+    b.channel("gone", 2, "scale", "STEP", &[0., 1.], &[1., 1., 1., 0., 0., 0.]);
+    let rig = load(&b);
+    assert_eq!(rig.notes, [format!("joint elbow: {mirrored}")]);
+    let notes: Vec<Vec<String>> = rig.clips.iter().map(|clip| clip.notes(&rig)).collect();
+    let back = format!("clip back: joint elbow: {mirrored}");
+    let gone = "clip gone: joint root: scaled by 0, where Gaussians vanish".to_owned();
+    assert_eq!(notes, [vec![], vec![back], vec![gone.clone()]]);
+    let track = skinsplat_data::poses::load_clip(&folder.path().join("rig.glb"), Some("gone")).unwrap();
+    assert_eq!(track.notes()[1], gone);
+    let mut b = arm();
+    b.json["nodes"][1]["scale"] = json!([0, 0, 0]);
+    assert_eq!(load(&b).notes, ["joint elbow and 1 more: scaled by 0, where Gaussians vanish"]);
+    // What carries the joints mirrors them all.
+    let mut b = arm();
+    b.json["nodes"][2]["scale"] = json!([-2, 2, 2]);
+    assert_eq!(load(&b).notes, [format!("joint elbow and 1 more: {mirrored}")]);
 }

@@ -1,7 +1,8 @@
 //! The textured mesh of a hybrid, and the stages in which both of its parts are fitted.
 
 use crate::Error;
-use crate::options::Moments;
+use crate::options::{Moments, POSITIVE, within};
+use crate::texture::MAX_SIZE;
 use serde::{Deserialize, Serialize};
 
 /// A textured mesh that is drawn with the Gaussians (HAHA): the body, its vertices moved onto the outlines in the masks,
@@ -70,9 +71,16 @@ impl MeshLayer {
         let refuse = |key: &str, value: String, expected: &str| {
             Err(Error::invalid(format!("recipe {id}: mesh.{key}"), value, expected))
         };
-        if self.texture == 0 {
-            return refuse("texture", self.texture.to_string(), "at least 1 texel");
+        if !(1..=MAX_SIZE).contains(&self.texture) {
+            return refuse("texture", self.texture.to_string(), &format!("1 to {MAX_SIZE} texels"));
         }
+        within(
+            "mesh",
+            &[
+                ("prior_weight", f64::from(self.prior_weight), POSITIVE),
+                ("gutter", self.gutter as f64, 0.0..=1024.0),
+            ],
+        )?;
         if !(self.rate.is_finite() && self.rate >= 0.0) {
             return refuse("rate", self.rate.to_string(), "a finite number, at least 0");
         }
