@@ -25,3 +25,5 @@ pub mod datasets;
 pub mod experiment;
 pub mod report;
 pub mod run;
+
+mod toml_problem;

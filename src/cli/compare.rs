@@ -10,6 +10,7 @@ use clap::builder::{OsStringValueParser, PossibleValue, PossibleValuesParser, Ty
 use skinsplat::report::compare::{self, Changes, Fate, Tolerances, Verdict};
 use skinsplat::report::{Results, picture_name};
 use skinsplat::run::pictures::single_picture;
+use skinsplat::run::store;
 use skinsplat_core::choice::one_of;
 use skinsplat_data::error::read_text;
 use skinsplat_table::{FORMATS, to_json};
@@ -219,6 +220,11 @@ pub(super) fn folder(run: &Path) -> &Path {
 /// A file that cannot be read or is none; the message names the file.
 pub(super) fn load(path: &Path) -> Result<Results> {
     let file = if path.is_dir() { path.join("results.json") } else { path.to_owned() };
+    if path.is_dir() && !file.exists() && !store::stores(path)?.is_empty() {
+        let done = "a run that has ended, or is done with a table: the same `reproduce run` goes on from what is there, and \
+                    `reproduce merge` collects slices";
+        bail!("{}: not there yet; expected {done}", file.display());
+    }
     let text = read_text(&file, "results", "a run's folder, or its results.json")?;
     Results::from_json(&text).map_err(|problem| anyhow!("{}: {problem}", file.display()))
 }

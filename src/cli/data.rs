@@ -7,6 +7,7 @@ use skinsplat::run::{Library, LoadedDataset, RegisteredAvatar};
 use skinsplat_core::choice::one_of;
 use skinsplat_data::folder::Options;
 use skinsplat_data::{Error, Subject};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The registry of a folder.
@@ -117,9 +118,10 @@ impl Data {
         dataset: &Dataset,
         experiments: &[Experiment],
         asking: Option<&Experiment>,
+        left_out: &BTreeSet<String>,
     ) -> Result<LoadedDataset> {
         let (mut subjects, mut unreadable) = (Vec::new(), Vec::new());
-        for id in dataset.subject_ids()? {
+        for id in dataset.subject_ids()?.into_iter().filter(|id| !left_out.contains(id)) {
             let gender = asking.and_then(|experiment| experiment.genders.get(&id)).copied();
             match dataset.load_one(&id, &Options { gender, ..self.options() }) {
                 Ok(subject) => subjects.push(subject),
@@ -138,22 +140,31 @@ impl Data {
         Ok(LoadedDataset { id, title, subjects, avatars: avatars.collect(), splits_given, unreadable })
     }
 
-    /// Loads what the experiments can use: their own datasets, and those that may stand in.
-    pub(super) fn library(&self, experiments: &[Experiment]) -> Result<Library> {
+    /// Loads what the experiments can use: their own datasets, and those that may stand in. Figures that nobody `asked` for are not
+    /// generated.
+    pub(super) fn library(&self, experiments: &[Experiment], asked: &[String]) -> Result<Library> {
         let own = |id: &str| experiments.iter().any(|experiment| experiment.data_id() == id);
         let stands_in = experiments.iter().any(|experiment| experiment.stand_in.is_some());
         let named = |d: &Dataset| own(&d.id) && d.is_begun();
         let wanted = |d: &Dataset| named(d) || (stands_in && d.stand_in && d.is_available());
         let registry = self.registry()?;
+        let mut known = BTreeSet::new();
+        for dataset in registry.datasets.iter().filter(|dataset| wanted(dataset)) {
+            known.extend(dataset.subject_ids()?);
+        }
+        // An error about a name that is nobody's lists all that there are.
+        let some_asked = !asked.is_empty() && asked.iter().all(|id| known.contains(id));
         let mut loaded: Vec<LoadedDataset> = Vec::new();
         for dataset in &registry.datasets {
             if wanted(dataset) {
-                loaded.push(self.load(dataset, experiments, None)?);
+                let skip = some_asked && !own(&dataset.id);
+                let left_out = if skip { not_asked(dataset, asked)? } else { BTreeSet::new() };
+                loaded.push(self.load(dataset, experiments, None, &left_out)?);
             }
             let asking =
                 |e: &&Experiment| e.has_own_bodies() && e.dataset == dataset.id && dataset.is_begun();
             for experiment in experiments.iter().filter(asking) {
-                loaded.push(self.load(dataset, experiments, Some(experiment))?);
+                loaded.push(self.load(dataset, experiments, Some(experiment), &BTreeSet::new())?);
             }
         }
         let mut broken = loaded.iter().flat_map(|dataset| &dataset.unreadable);
@@ -170,6 +181,12 @@ impl Data {
         }
         Ok(library)
     }
+}
+
+/// The figures of a generated data set that are not among the subjects asked for.
+fn not_asked(dataset: &Dataset, asked: &[String]) -> Result<BTreeSet<String>> {
+    let ids = if dataset.is_generated() { dataset.subject_ids()? } else { Vec::new() };
+    Ok(ids.into_iter().filter(|id| !asked.contains(id)).collect())
 }
 
 /// Every data set that is there, or the one of this id.

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, bail};
 use skinsplat_core::math::sh;
 use skinsplat_core::scene::{Avatar, Binding, Gaussians, Pose, PosedBody, RestBody, SkinWeights};
 use skinsplat_data::gltf::{Motion, write_skinned_splats, write_splats};
-use skinsplat_data::ply;
+use skinsplat_data::{atomic, ply};
 use skinsplat_posing::{BoundAvatar, PoseOptions, Poser, Strategy, bake};
 use std::path::{Path, PathBuf};
 
@@ -69,6 +69,7 @@ PLY to GLB turns by 180 degrees about z; --to glb here does not.)
 
 impl Export {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
+        self.check_choices()?;
         if self.to == Kind::SpzHint {
             emit(SPZ_HINT)?;
             return Ok(Exit::Success);
@@ -95,6 +96,24 @@ impl Export {
         Ok(Exit::Success)
     }
 
+    /// Refuses options that the kind of file would leave without effect.
+    fn check_choices(&self) -> Result<()> {
+        let chosen = match (self.to, self.posing.chosen()) {
+            (Kind::SpzHint, _) if self.out.is_some() => Some("--out"),
+            (Kind::SpzHint, _) if self.degree.is_some() => Some("--degree"),
+            (Kind::SpzHint | Kind::SkinnedGlb, Some(option)) => Some(option),
+            (_, Some("--frame")) if self.all_frames => {
+                bail!("--frame with --all-frames; expected one of the two")
+            }
+            _ => None,
+        };
+        let what = match self.to {
+            Kind::SpzHint => "--to spz-hint, which writes nothing",
+            _ => "--to skinned-glb, which holds every pose and no strategy",
+        };
+        chosen.map_or(Ok(()), |option| bail!("{option} with {what}; expected it without"))
+    }
+
     /// Refuses what the kind of file does not allow: frame by frame, or under another ending.
     fn check_out(&self, out: &Path) -> Result<()> {
         if self.all_frames && self.to == Kind::SkinnedGlb {
@@ -107,7 +126,8 @@ impl Export {
             Some(found) if !self.all_frames && !found.eq_ignore_ascii_case(expected) => {
                 bail!("--out {}; expected a file whose name ends in .{expected}", out.display())
             }
-            _ => Ok(()),
+            _ if self.all_frames => Ok(()),
+            _ => Ok(atomic::check(out)?),
         }
     }
 
@@ -138,9 +158,6 @@ impl Export {
     fn write_skinned(&self, out: &Path, avatar: &Avatar, track: &Track<'_>, context: Context) -> Result<()> {
         let (avatar, note) = by_weights(avatar, track.rest)?;
         note.iter().for_each(|note| context.note(note));
-        if !track.rest.pose_directions.is_empty() {
-            context.note("blend shapes of poses are left out: a skin has none");
-        }
         let gaussians = of_degree(&avatar.gaussians, self.degree);
         let avatar = Avatar { gaussians, ..avatar };
         let poses: Vec<Pose> = track.poses.iter().map(|&pose| pose.clone()).collect();
@@ -200,6 +217,11 @@ pub(super) fn by_weights(avatar: &Avatar, rest: &RestBody) -> Result<(Avatar, Op
     let body = PosedBody::new(rest, &Pose::rest(&rest.skeleton))?;
     let strategy = Strategy::preset("quaternion-average").context("no such preset")?;
     gaussians.means = Poser::new().pose(&bound, &body, &strategy, &PoseOptions::default())?.means.to_vec();
-    let note = "Gaussians on faces: a skin moves them by weights, not with their face";
+    let note = match rest.pose_directions.is_empty() {
+        true => "Gaussians on faces: a skin moves them by weights, not with their face",
+        false => {
+            "Gaussians on faces: a skin moves them by weights, not with their face, and without the blend shapes that poses drive"
+        }
+    };
     Ok((Avatar { gaussians, binding: Binding::Vertex(weights) }, Some(note)))
 }

@@ -8,6 +8,7 @@ use anyhow::{Context as _, Result, bail};
 use skinsplat::experiment::Profile;
 use skinsplat::run::fitting::{self, FitEvent, FitFiles, FitReport, Tests};
 use skinsplat::run::held_out::HeldOut;
+use skinsplat::run::subject_notes;
 use skinsplat_data::select::evenly_spaced;
 use skinsplat_data::{Sequence, Subject, atomic};
 use skinsplat_fit::FitOptions;
@@ -73,6 +74,7 @@ impl Fit {
         atomic::check(&self.out)?;
         let recipe = Recipe::parse(&self.recipe)?;
         let (dataset, subject) = self.data.subject(&self.subject)?;
+        subject_notes(&subject).iter().for_each(|note| context.note(format!("{}: {note}", subject.id)));
         let (training, tests) = self.sequences(&subject)?;
         let iterations = recipe.length(training.frames.len(), self.profile.fit_iterations);
         let options = FitOptions {

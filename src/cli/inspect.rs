@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Reads avatars (.ply, .npz, .pth, .ckpt, .glb with Gaussians, exports of SplattingAvatar), bodies (.npz, .pkl, .glb, .gltf), poses and cameras
 /// (.npz, .pkl, .json), images, results.json and the results store of a run, parts of data sets (.npy, .tiff, .hdf5, .txt); and folders: a subject in any of the layouts that
-/// are read, folders of subjects, exports of SplattingAvatar, images that another program rendered.
+/// are read, folders of subjects, a run, exports of SplattingAvatar, images that another program rendered.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Inspect {
@@ -183,10 +183,12 @@ fn notes_text(notes: &[String]) -> String {
 }
 
 fn clips_text(path: &Path) -> Result<String> {
+    let rig = skinsplat_data::gltf::Rig::load(path)?;
     let clip = |clip: &skinsplat_data::gltf::Clip| {
-        line(&format!("clip {}", clip.name), format!("{} keys", clip.key_times().len()))
+        let keys = format!("{} keys", clip.key_times().len());
+        line(&format!("clip {}", clip.name), keys) + &notes_text(&clip.notes(&rig))
     };
-    Ok(skinsplat_data::gltf::Rig::load(path)?.clips.iter().map(clip).collect())
+    Ok(rig.clips.iter().map(clip).collect())
 }
 
 /// An `.npz` archive or a pickle: its arrays, and what they are together.
@@ -204,7 +206,7 @@ fn arrays_text(path: &Path) -> Result<String> {
         return Ok(text + &body_text(&body::read(path)?) + &unread_text(&arrays.names(), &body::ARRAYS));
     }
     if has("intrinsic") || has("K") {
-        return Ok(text + &cameras_text(path)? + &unread_text(&arrays.names(), &camera::ARRAYS));
+        return Ok(text + &cameras_text(path)?);
     }
     if poses::is_motion(&arrays) {
         return Ok(text + &motion_text(&poses::load(path)?));

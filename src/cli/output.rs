@@ -4,7 +4,7 @@
 use anyhow::{Context as _, Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use skinsplat_data::atomic;
-use skinsplat_table::{FORMATS, Format as TableFormat, Table, to_json};
+use skinsplat_table::{FORMATS, Format as TableFormat, Table, is_hidden, to_json};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use std::path::Path;
 /// As the file behind it, such as a full disk's.
 pub(super) fn emit(text: &str) -> Result<()> {
     // Names and comments are whatever files say: a terminal obeys none of them.
-    let commands = |c: char| c.is_control() && c != '\n' && c != '\t';
+    let commands = |c: char| is_hidden(c) && c != '\n' && c != '\t';
     let text = text.replace(commands, "\u{fffd}");
     let mut out = std::io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
@@ -54,7 +54,7 @@ pub(super) fn save(path: &Path, text: &str) -> Result<()> {
 /// Writes a line to standard error. Where nobody reads it, there is nobody to be told.
 pub(super) fn say(line: impl std::fmt::Display) {
     // Names are whatever files say: a terminal obeys none of them.
-    let line = line.to_string().replace(char::is_control, "\u{fffd}");
+    let line = line.to_string().replace(is_hidden, "\u{fffd}");
     let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 

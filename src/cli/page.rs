@@ -41,9 +41,11 @@ pub(super) const PICTURES: &str = "pictures";
 
 /// The page of a run as HTML: its results with what lies in its folder. Without a folder there is nothing but the results.
 ///
+/// Frames with a picture that is gone or broken are shown without pictures, and a line says so.
+///
 /// # Errors
-/// Pictures or records that cannot be read; the message names the file.
-pub(super) fn page(results: &Results, folder: &Path, images: Images) -> Result<String> {
+/// Records that cannot be read; the message names the file.
+pub(super) fn page(results: &Results, folder: &Path, images: Images, context: Context) -> Result<String> {
     let curves = folder.join("curves.csv");
     let curves = match curves.is_file() {
         true => read_text(&curves, "curves", "the curves.csv of a run")?,
@@ -65,12 +67,16 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images) -> Result<S
     index.frames.retain(|kept| has(&kept.table));
     index.moving.retain(|of| has(&of.table));
     extras.pictures.kept = index.frames.len();
-    extras.pictures.moving = index.moving.iter().map(|of| moving(&pictures, of)).collect::<Result<_>>()?;
-    extras.pictures.stills = stills(&pictures, &index.frames, FEW)?;
+    let mut lost = Lost::default();
+    extras.pictures.moving = index.moving.iter().filter_map(|of| lost.or(moving(&pictures, of))).collect();
+    let mut lost_stills = Lost::default();
+    extras.pictures.stills = stills(&pictures, &index.frames, FEW, &mut lost_stills);
     if index.frames.len() > FEW {
         let fit = frames_that_fit(results, &extras, index.frames.len());
-        extras.pictures.stills = stills(&pictures, &index.frames, fit)?;
+        lost_stills = Lost::default();
+        extras.pictures.stills = stills(&pictures, &index.frames, fit, &mut lost_stills);
     }
+    [lost, lost_stills].iter().for_each(|lost| lost.say(context));
     extras.pictures.unread = unread(&index.frames, &extras.pictures.stills);
     Ok(html(results, &extras))
 }
@@ -96,10 +102,38 @@ fn index(folder: &Path, images: Images) -> Result<Option<Index>> {
     Ok(Some(index))
 }
 
-/// The pictures of at most so many frames, evenly spaced.
-fn stills(folder: &Path, frames: &[Kept], most: usize) -> Result<Vec<Stills>> {
+/// Pictures that the run kept and that cannot be read any more.
+#[derive(Default)]
+struct Lost {
+    count: usize,
+    /// The first, and why.
+    first: Option<anyhow::Error>,
+}
+
+impl Lost {
+    /// What was read; counted if it was not.
+    fn or<T>(&mut self, read: Result<T>) -> Option<T> {
+        read.map_err(|error| {
+            self.count += 1;
+            self.first.get_or_insert(error);
+        })
+        .ok()
+    }
+
+    fn say(&self, context: Context) {
+        if let Some(first) = &self.first {
+            let count = self.count;
+            context.note(format!(
+                "{count} of the pictures are not shown: {first:#}; expected what the run kept"
+            ));
+        }
+    }
+}
+
+/// The pictures of at most so many frames, evenly spaced, without those that cannot be read.
+fn stills(folder: &Path, frames: &[Kept], most: usize, lost: &mut Lost) -> Vec<Stills> {
     let frames: Vec<&Kept> = frames.iter().collect();
-    evenly_spaced(&frames, Some(most)).into_iter().map(|kept| still(folder, kept)).collect()
+    evenly_spaced(&frames, Some(most)).into_iter().filter_map(|kept| lost.or(still(folder, kept))).collect()
 }
 
 /// Frames whose pictures were not read.

@@ -84,7 +84,16 @@ impl Planning {
     /// Loads experiments and data, and plans.
     pub(super) fn plan(&self) -> Result<Planned> {
         let experiments = self.with_given_avatars(self.experiments()?)?;
-        let mut library = self.data.library(&experiments)?;
+        match self.plan_on(experiments.clone(), &self.subjects) {
+            // What is wrong with a choice of subjects is told with all that there are.
+            Err(_) if !self.subjects.is_empty() => self.plan_on(experiments, &[]),
+            planned => planned,
+        }
+    }
+
+    /// Plans; figures that are not `asked` for are not generated.
+    fn plan_on(&self, experiments: Vec<Experiment>, asked: &[String]) -> Result<Planned> {
+        let mut library = self.data.library(&experiments, asked)?;
         for GivenAvatar { variant, file } in &self.avatars {
             library.register(&RegisteredAvatar { name: given_name(variant), path: file.clone() });
         }

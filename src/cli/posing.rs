@@ -100,9 +100,13 @@ impl Posing {
             remarks.extend(said(avatar, vec![note]));
         }
         let Motion { rest, pose, before, framerate } = match &self.poses {
+            None if self.frame != 0 => {
+                bail!("--frame {} without --poses; expected a track of poses", self.frame)
+            }
             None => {
                 let (rest, notes) = body::shape(&model.body, betas.as_deref().unwrap_or(&[]), &[])?;
                 remarks.extend(said(body_path, notes));
+                remarks.push("no --poses: the body is at rest".to_owned());
                 let pose = Pose::rest(&rest.skeleton);
                 Motion { pose, rest, before: Vec::new(), framerate: None }
             }
@@ -117,7 +121,13 @@ impl Posing {
             scale_note(&joints, self.strategy).map(|note| format!("{}: {note}", body_path.display())),
         );
         let OnBody { avatar: bound, body, mesh, notes } = on_body(loaded, &rest)?;
-        let notes = said(avatar, notes).into_iter().chain(remarks).collect();
+        let mut notes = said(avatar, notes);
+        for remark in remarks {
+            // A file that is body and poses says the same of both.
+            if !notes.contains(&remark) {
+                notes.push(remark);
+            }
+        }
         let rest = Some((body.unwrap_or(rest), pose));
         Ok(Subject { avatar: bound, mesh, rest, before, framerate, notes })
     }

@@ -1,15 +1,16 @@
 //! Words of a shell.
 
+use skinsplat_table::is_hidden;
 use std::ffi::OsStr;
 use std::fmt::Write;
 
-/// A word that bash reads as this argument, whatever it holds, on one line. Bytes that are no text, and control characters,
-/// become escapes.
+/// A word that bash reads as this argument, whatever it holds, on one line. Bytes that are no text, and characters that a
+/// terminal obeys, become escapes.
 pub(super) fn quoted(argument: &OsStr) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_./:=,+@%-".contains(c);
     match argument.to_str() {
         Some(text) if !text.is_empty() && text.chars().all(plain) => text.to_owned(),
-        Some(text) if !text.contains(char::is_control) => format!("'{}'", text.replace('\'', r"'\''")),
+        Some(text) if !text.contains(is_hidden) => format!("'{}'", text.replace('\'', r"'\''")),
         _ => escaped(argument.as_encoded_bytes()),
     }
 }
@@ -46,6 +47,7 @@ mod tests {
             ("two words", "'two words'"),
             ("it's $HOME", r"'it'\''s $HOME'"),
             ("ä", "'ä'"),
+            ("a\u{202e}b", r"$'a\342\200\256b'"),
             ("a\nEND_OF_JOB\n'1", r"$'a\012END_OF_JOB\012\'1'"),
         ] {
             assert_eq!(quoted(OsStr::new(argument)), word);

@@ -69,7 +69,7 @@ impl Report {
         }
         check_tables(&tables, std::slice::from_ref(&results))?;
         let results = only(&tables, results);
-        let text = if self.timing { self.timing(&results)? } else { self.tables(&results)? };
+        let text = if self.timing { self.timing(&results)? } else { self.tables(&results, context)? };
         match &self.out {
             Some(path) if self.format(MARKDOWN) == HTML => write_page(path, &text, context)?,
             Some(path) => save(path, &text)?,
@@ -84,9 +84,9 @@ impl Report {
     }
 
     /// The tables in the wanted format.
-    fn tables(&self, results: &Results) -> Result<String> {
+    fn tables(&self, results: &Results, context: Context) -> Result<String> {
         Ok(match self.format(MARKDOWN) {
-            HTML => page(results, folder(&self.run), self.images)?,
+            HTML => page(results, folder(&self.run), self.images, context)?,
             format => printed(results, format),
         })
     }

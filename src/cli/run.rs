@@ -156,13 +156,13 @@ impl Run {
         let Planned { plan, library, networks, experiments, .. } = planned;
         let left = store::outstanding(&plan.shard(self.shard), &self.records()?);
         run::check(&left, library)?;
+        let path = self.out.join(self.store_name());
+        let mut store = Store::open(&path, &plan.digest, &Machine::here())?;
         if self.shard.is_some() {
             PlanFile::new(plan, experiments, left_out(planned)).write(&self.out)?;
         } else if self.printed.format == MARKDOWN {
             emit(&report::head(&report::results(plan, experiments, &Records::default())?))?;
         }
-        let path = self.out.join(self.store_name());
-        let mut store = Store::open(&path, &plan.digest, &Machine::here())?;
         let avatars = self.out.join(AVATARS);
         let mut tables = Vec::new();
         for (index, table) in plan.tables.iter().enumerate() {
@@ -174,9 +174,17 @@ impl Run {
             })?;
             drop(watch);
             if self.shard.is_none() {
-                let results = report::table_results(plan, index, experiments, &self.records()?)?;
-                self.print(&results)?;
-                tables.push(results);
+                let records = self.records()?;
+                tables.push(report::table_results(plan, index, experiments, &records)?);
+                self.print(&tables[index])?;
+                // A run that ends here can be reported on: the tables to come with what is known of them.
+                if index + 1 < plan.tables.len() {
+                    let to_come = (index + 1..plan.tables.len())
+                        .map(|index| report::table_results(plan, index, experiments, &records));
+                    let all: Vec<_> =
+                        tables.iter().cloned().map(Ok).chain(to_come).collect::<Result<_, _>>()?;
+                    write_results(&self.out, &report::results_of(plan, all))?;
+                }
             }
         }
         Ok((left.len(), self.shard.is_none().then(|| report::results_of(plan, tables))))
@@ -287,7 +295,7 @@ impl Run {
         let costs = costs::measure(plan, library, &self.out.join(AVATARS), &|event| watch.see(event))?;
         drop(watch);
         write_text(&self.out.join(costs::FILE_NAME), &(serde_json::to_string_pretty(&costs)? + "\n"))?;
-        write_page(path, &page(results, &self.out, images)?, context)
+        write_page(path, &page(results, &self.out, images, context)?, context)
     }
 
     fn write_motion(

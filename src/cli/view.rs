@@ -60,9 +60,6 @@ impl View {
         if let Some(option) = self.posing.chosen() {
             bail!("{option}: not read; the page holds every pose and switches rotations itself");
         }
-        if !self.posing.has_poses() {
-            context.note("no --poses: the page shows the rest pose");
-        }
         let posing = if self.posing.has_poses() { self.posing.at_last_frame()? } else { self.posing.clone() };
         let subject = posing.load(&self.avatar)?;
         subject.notes().iter().for_each(|note| context.note(note));

@@ -2,6 +2,7 @@
 
 mod load;
 
+use crate::toml_problem::TomlProblem;
 use serde::{Deserialize, Serialize};
 use skinsplat_core::choice::one_of;
 use skinsplat_data::folder::{self, Options, Subject};
@@ -136,14 +137,10 @@ impl Registry {
     }
 
     fn parse(text: &str, path: &Path) -> Result<Self, Error> {
-        let malformed = |e: toml::de::Error| {
-            let line = e.span().map_or(0, |span| line_of(text, span.start));
-            Error::invalid(
-                path,
-                format!("line {line}"),
-                e.message().replace('\n', " "),
-                "a [[dataset]] table",
-            )
+        let malformed = |error: toml::de::Error| {
+            let TomlProblem { line, problem, expected, .. } = TomlProblem::of(text, &error);
+            let expected = expected.unwrap_or_else(|| "a [[dataset]] table".to_owned());
+            Error::invalid(path, format!("line {line}"), problem, expected)
         };
         let File { dataset: mut datasets } = toml::from_str(text).map_err(malformed)?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -166,6 +163,10 @@ impl Registry {
                     format!("the path {name:?}"),
                     "names of folders inside path",
                 ));
+            }
+            let mut seen = BTreeSet::new();
+            if let Some(twice) = dataset.subjects.iter().find(|name| !seen.insert(name.as_str())) {
+                return Err(invalid("subjects", format!("{twice:?} again"), "each subject once"));
             }
             let names: BTreeSet<&str> = dataset.avatars.iter().map(|avatar| avatar.name.as_str()).collect();
             if names.len() < dataset.avatars.len() || names.contains("") {
@@ -263,10 +264,6 @@ fn known_layout<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Str
     }
     let known: Vec<&str> = known().collect();
     Err(serde::de::Error::custom(format!("layout: {id:?}; expected one of {}", known.join(", "))))
-}
-
-fn line_of(text: &str, offset: usize) -> usize {
-    text.bytes().take(offset).filter(|&b| b == b'\n').count() + 1
 }
 
 fn found(folder: &Path) -> Result<Dataset, Error> {

@@ -57,6 +57,12 @@ fn check_columns(e: &Experiment, file: &str) -> Result<(), Error> {
         let given = e.columns.iter().any(|other| other.metric == column.metric && !other.fitted);
         column.fitted && (e.test_poses == TestPoses::AsGiven || !given)
     };
+    if let Some(column) = e.columns.iter().find(|column| column.fitted && column.metric.needs_before()) {
+        let problem = format!("`fitted` of {}", column.metric.id());
+        let expected =
+            "it as given only: each pose is fitted to its own image, so there is no fitted frame before it";
+        return Err(Error::invalid(file, "columns", problem, expected));
+    }
     match e.columns.iter().find(alone) {
         None => Ok(()),
         Some(column) => {
@@ -107,8 +113,8 @@ pub(super) fn check(e: &Experiment, file: &str) -> Result<(), Error> {
     Ok(())
 }
 
-/// Where test poses are fitted, every column of a metric of frames becomes two: as given, then fitted. An experiment that was
-/// written after that stays as it is.
+/// Where test poses are fitted, every column of a metric of frames becomes two: as given, then fitted; metrics of motion, which see
+/// the frame before, are of poses as given. An experiment that was written after that stays as it is.
 pub(super) fn expand(mut e: Experiment) -> Experiment {
     if e.test_poses == TestPoses::AsGiven || e.columns.iter().any(|column| column.fitted) {
         return e;
@@ -122,7 +128,8 @@ pub(super) fn expand(mut e: Experiment) -> Experiment {
             fitted,
             ..column.clone()
         };
-        vec![titled("as given", false), titled("fitted", true)]
+        let given = titled("as given", false);
+        if column.metric.needs_before() { vec![given] } else { vec![given, titled("fitted", true)] }
     };
     e.columns = e.columns.into_iter().flat_map(both).collect();
     e

@@ -4,6 +4,7 @@ use super::{
     EMBEDDED, Error, FURTHER, Grid, Paper, Profile, Replicate, Source, Split, TestPoses, catalog, grid,
     poses, seeds, validate,
 };
+use crate::toml_problem::TomlProblem;
 use serde::{Deserialize, Serialize};
 use skinsplat_data::{Capture, Gender, source};
 use skinsplat_fit::options::PoseFit;
@@ -438,10 +439,7 @@ impl Experiment {
 
 /// The parser's complaint in one line, with the line that it is about.
 fn toml_error(text: &str, file: &str, error: &toml::de::Error) -> Error {
-    let start = error.span().map_or(0, |span| span.start.min(text.len()));
-    let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count();
-    let excerpt = text.lines().nth(line).unwrap_or_default().trim();
-    let shown: String = excerpt.chars().take(80).collect();
-    let message = error.message().trim().replace('\n', ", ");
-    Error::Toml { file: file.into(), line: line + 1, message, excerpt: shown }
+    let problem = TomlProblem::of(text, error);
+    let message = problem.message();
+    Error::Toml { file: file.into(), line: problem.line, message, excerpt: problem.excerpt }
 }

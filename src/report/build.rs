@@ -93,6 +93,10 @@ fn measured(experiment: &Experiment, sequence: &SequenceResults, group: &Group, 
         let mut cell = over_seeds(&contents, column);
         cell.missing = missing;
         if let Some(reason) = &sequence.missing {
+            // There is data, of which nothing can be scored.
+            if sequence.data.is_some() {
+                cell = Cell::new(Content::NotComputed, digits(column));
+            }
             cell.notes.push(notes.index(format!("{}: {reason}", sequence.label)));
         } else if cell.content != Content::NotApplicable {
             for variant in members.iter().filter(|variant| variant.missing() > 0) {
@@ -100,7 +104,8 @@ fn measured(experiment: &Experiment, sequence: &SequenceResults, group: &Group, 
                 cell.notes.push(notes.index(format!("{at}: {}", missing_frames(&variant.frames))));
             }
         }
-        if cell.content == Content::NotComputed {
+        let scored = members.iter().all(|variant| variant.summary.is_some());
+        if scored && cell.content == Content::NotComputed {
             let unfitted = members.iter().filter(|_| column.fitted).find_map(|variant| unfitted(variant));
             let note = match unfitted {
                 Some(why) => format!("n/c: {}, {}: {why}", sequence.label, group.label),
@@ -131,7 +136,11 @@ fn over_seeds(contents: &[Content], column: &Column) -> Cell {
 fn content(variant: &VariantResults, column: &Column) -> Content {
     match variant.value(column.shown()) {
         Some(value) => Content::number(value),
-        None if variant.summary.is_none() => Content::Missing,
+        // Tried and failed, or nobody tried.
+        None if variant.summary.is_none() => match variant.frames.iter().any(|frame| frame.error.is_some()) {
+            true => Content::NotComputed,
+            false => Content::Missing,
+        },
         None if column.metric.is_of_frames() => Content::NotComputed,
         None => Content::NotApplicable,
     }
@@ -202,14 +211,14 @@ fn mean(
         };
         let mut cell = over_seeds(&group.members.iter().map(of_seed).collect::<Vec<_>>(), column);
         cell.missing = missing;
-        if let (Some(sequence), Content::Missing) = (without, cell.content) {
+        if let (Some(sequence), Content::Missing | Content::NotComputed) = (without, cell.content) {
             let note = format!("{label}, {}: no mean, {} has no value", group.label, sequence.label);
             cell.notes.push(notes.index(note));
         } else if missing > 0 && cell.content != Content::NotApplicable {
             let note = format!("{label}, {}: {} missing in all", group.label, count(missing, "frame"));
             cell.notes.push(notes.index(note));
         }
-        if cell.content == Content::NotComputed {
+        if without.is_none() && cell.content == Content::NotComputed {
             let all: Vec<&VariantResults> = all().collect();
             cell.notes.push(notes.index(not_computed(column, &all)));
         }

@@ -62,7 +62,7 @@ fn table(
     let variants: Vec<&Variant> = planned.variants.iter().filter_map(|id| experiment.variant(id)).collect();
     let sequences = planned.rows.iter().enumerate().map(|(r, row)| {
         let jobs: Vec<&Job> = jobs.iter().copied().filter(|job| job.row == r).collect();
-        sequence(row, &variants, &jobs, records, &protocol)
+        sequence(row, experiment, &variants, &jobs, records, &protocol)
     });
     let sequences: Vec<SequenceResults> = sequences.collect::<Result<_, _>>()?;
     let mut made = build::table(experiment, planned, &plan.options, &sequences);
@@ -73,6 +73,7 @@ fn table(
         protocol: planned.protocol.clone(),
         datasets: planned.datasets.clone(),
         source: planned.source,
+        test_pose: experiment.fitted_test_poses().cloned(),
         table: made,
         comparisons: build::comparisons(experiment, &sequences),
         paper: experiment.paper.as_ref().map(|paper| paper::printed_table(experiment, paper)),
@@ -82,6 +83,7 @@ fn table(
 
 fn sequence(
     row: &DataRow,
+    experiment: &Experiment,
     variants: &[&Variant],
     jobs: &[&Job],
     records: &Records,
@@ -105,6 +107,8 @@ fn sequence(
             avatar: variant.avatar.clone(),
             sh_degree: variant.sh_degree,
             strategy: variant.strategy.clone(),
+            pose_noise: experiment.noise_of(variant),
+            takes: variant.takes,
             summary: summary
                 .map_err(|source| Error::Scores { at: format!("{}, {}", row.id, variant.id), source })?,
             fitted: fitted

@@ -2,6 +2,7 @@
 
 use serde::de::DeserializeOwned;
 use serde_json::error::Category;
+use skinsplat_data::words::Language;
 
 /// Reads a document of JSON; `what` is what it should be.
 ///
@@ -18,40 +19,14 @@ pub(super) fn from_json<T: DeserializeOwned>(text: &str, what: &str) -> Result<T
 fn described(place: &str, message: &str) -> String {
     // The place says it better.
     let message = message.rsplit_once(" at line ").map_or(message, |(message, _)| message);
-    let (problem, expected) = message.split_once(", expected ").unwrap_or((message, ""));
-    let problem = ["invalid type: ", "invalid value: "]
-        .iter()
-        .find_map(|start| problem.strip_prefix(start))
-        .unwrap_or(problem);
-    // Types of objects read lists too, of as many fields.
-    let problem = if problem.starts_with("invalid length") { "a list" } else { problem };
+    let (problem, expected) = Language::Json.told(message);
     let expected = match expected {
-        "" if problem.starts_with("missing field") => "it, as reports/SCHEMA.md says".to_owned(),
-        "" => "what reports/SCHEMA.md says".to_owned(),
-        known => format!("{}, as reports/SCHEMA.md says", in_words(known)),
+        None if problem.starts_with("missing field") => "it, as reports/SCHEMA.md says".to_owned(),
+        None => "what reports/SCHEMA.md says".to_owned(),
+        Some(known) => format!("{known}, as reports/SCHEMA.md says"),
     };
     let place = if place.is_empty() { String::new() } else { format!("{place}: ") };
-    format!("{place}{}; expected {expected}", in_words(problem))
-}
-
-/// Types by what they are in JSON.
-fn in_words(text: &str) -> String {
-    let words: [(&[&str], &str); 5] = [
-        (&["f64", "f32", "floating point"], "a number"),
-        (&["u8", "u16", "u32", "u64", "usize", "i32", "i64"], "a whole number"),
-        (&["a sequence", "sequence", "a tuple", "tuple"], "a list"),
-        (&["a map", "map", "struct", "internally", "adjacently"], "an object"),
-        (&["string", "a string"], "text"),
-    ];
-    let named = words.iter().find_map(|(names, word)| {
-        let rest = names.iter().find_map(|name| {
-            let rest = text.strip_prefix(name)?;
-            (rest.is_empty() || rest.starts_with([' ', ','])).then_some(rest)
-        })?;
-        // Of a type only its name follows, of what was found its value.
-        Some(if rest.contains(['"', '`']) { format!("{word}{rest}") } else { (*word).to_owned() })
-    });
-    named.unwrap_or_else(|| text.to_owned())
+    format!("{place}{problem}; expected {expected}")
 }
 
 /// A list or an object that a place lies in.

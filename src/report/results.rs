@@ -3,8 +3,9 @@
 
 use super::comparison::Comparison;
 use super::reading::from_json;
-use crate::experiment::{AvatarRecipe, CodeVersions, FittedOutcome, Options, Shown, Source};
+use crate::experiment::{AvatarRecipe, CodeVersions, FittedOutcome, Options, PoseNoise, Shown, Source};
 use serde::{Deserialize, Serialize};
+use skinsplat_fit::options::PoseFit;
 use skinsplat_metrics::{FrameScore, ProtocolId, Summary};
 use skinsplat_table::{Digits, Table, to_json};
 use std::collections::BTreeSet;
@@ -87,6 +88,9 @@ pub struct TableResults {
     pub datasets: Vec<(String, String)>,
     /// Own data, a stand-in, or nothing.
     pub source: Source,
+    /// How test poses were fitted, where they were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test_pose: Option<PoseFit>,
     /// The table as it is printed.
     pub table: Table,
     /// Variants compared frame by frame, per sequence and over all of them.
@@ -160,6 +164,12 @@ pub struct VariantResults {
     pub sh_degree: Option<u8>,
     /// Strategy spec; none for a textured mesh.
     pub strategy: Option<String>,
+    /// Noise on its poses, for training and test.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_noise: Option<PoseNoise>,
+    /// Training sequences that it is fitted to, where the experiment says how many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub takes: Option<u32>,
     /// The metrics over the scored frames, aggregated as the protocol says; none without a scored frame.
     pub summary: Option<Summary>,
     /// The same with every pose fitted to its image; none unless that was asked for and every scored frame has it.

@@ -130,11 +130,17 @@ fn describe_subject(
     let renders = places.map(|(path, sequence)| renders::describe(path, &subject.id, sequence));
     let renders = renders.collect::<Result<_, _>>()?;
     let split_given = dataset.splits_given.contains(&subject.id);
+    let notes = subject_notes(subject);
+    let (id, capture) = (subject.id.clone(), subject.capture);
+    Ok(SubjectInfo { id, capture, sequences, split_given, notes, avatars, renders })
+}
+
+/// What a reader of numbers has to know of a subject: what its files say or lack, and what a quick look finds.
+pub fn subject_notes(subject: &Subject) -> Vec<String> {
     let mut notes = subject.notes.clone();
     notes.extend(skinsplat_check::subject(subject).iter().map(|found| format!("check finds {}", found.kind)));
     notes.extend(subject.sequences().flat_map(misfits));
-    let (id, capture) = (subject.id.clone(), subject.capture);
-    Ok(SubjectInfo { id, capture, sequences, split_given, notes, avatars, renders })
+    notes
 }
 
 /// Width and height of the largest image of a sequence.

@@ -40,5 +40,5 @@ pub mod textured;
 
 pub use error::Error;
 pub use execute::{Event, check, execute};
-pub use library::{Library, LoadedDataset, RegisteredAvatar};
+pub use library::{Library, LoadedDataset, RegisteredAvatar, subject_notes};
 pub use machine::Machine;

@@ -111,9 +111,26 @@ fn pictures_that_both_runs_kept_are_named() {
     assert!(!out.contains("pictures"), "one of the runs has none");
 }
 
+/// A page shows the pictures that are there.
+#[test]
+fn a_page_goes_on_without_a_picture_that_is_gone() {
+    let desk = finished();
+    let whole = desk.ok(args!["report", "run", "--format", "html"]);
+    let kept = crate::program::contents(&desk.path("run/pictures"));
+    let is_png = |path: &std::path::PathBuf| path.extension().is_some_and(|e| e == "png");
+    let picture = kept.into_iter().map(|(path, _)| path).find(is_png).unwrap();
+    std::fs::write(&picture, "cut off").unwrap();
+    let told = desk.run(args!["report", "run", "--format", "html"]).exits(0, "the others are there");
+    assert!(told.out.contains("<html") && told.out.len() < whole.len());
+    let name = picture.file_name().unwrap().to_string_lossy().into_owned();
+    assert!(told.err.contains(&name) && told.err.contains("not shown"), "{}", told.err);
+}
+
 #[test]
 fn what_cannot_be_compared_is_refused_in_one_line() {
     let desk = finished();
+    desk.put("begun/frames.jsonl", "");
+    desk.run(args!["report", "begun"]).refuses(&["results.json", "not there yet"], "a run that is not done");
     for (arguments, parts) in [
         (args!["compare", "run"], ["one run", "expected two"]),
         (args!["compare", "run", "run", "--against-paper"], ["--against-paper", "expected one"]),

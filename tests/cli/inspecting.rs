@@ -52,6 +52,16 @@ fn every_layout_is_recognised() {
 }
 
 #[test]
+fn a_run_is_told_from_a_folder_of_images() {
+    let desk = Desk::new();
+    desk.ok(args!["run", "ci", "--limit", "1", "--variant", "face", "--out", "run"]);
+    let text = desk.ok(args!["inspect", "run"]);
+    has(&text, &["run of reproduce", "protocol avatar-v1", "frames.jsonl", "missing scores", "avatars made"]);
+    std::fs::remove_file(desk.path("run/results.json")).unwrap();
+    has(&desk.ok(args!["inspect", "run"]), &["not there yet", "results store"]);
+}
+
+#[test]
 fn what_is_missing_is_named_with_its_alternatives() {
     let desk = Desk::new();
     copy(&data("small/layouts/neuman/ava"), &desk.path("ava"));

@@ -1,7 +1,7 @@
 //! What moved between two results documents.
 
 use super::made_up::{results, run, table_7, with_holes};
-use skinsplat::experiment::{FittedOutcome, Outcome, Plan, Records, Source};
+use skinsplat::experiment::{FittedOutcome, Outcome, Plan, PoseNoise, Records, Source};
 use skinsplat::report::compare::{
     Changes, Fate, Tolerances, Verdict, against_paper, compare, github, junit, markdown, text,
 };
@@ -213,6 +213,50 @@ fn other_circumstances_are_said() {
             format!("code version of render: {render} in the baseline, {} now", render + 1)
         ]
     );
+}
+
+/// An id may stand for something else than it did: that is said, and other noise on the poses is other data.
+#[test]
+fn other_ways_to_make_a_variant_are_said() {
+    let mut current = base();
+    for sequence in &mut current.tables[0].sequences {
+        let quaternions = &mut sequence.variants[1];
+        (quaternions.strategy, quaternions.takes) = (Some("lbs".to_owned()), Some(2));
+    }
+    let changes = compare(&base(), &current, &Tolerances::parse("[tables.table9]\npsnr = 1\n").unwrap());
+    let notes: Vec<&str> = changes.notes.iter().map(|note| note.text.as_str()).collect();
+    assert_eq!(
+        notes,
+        [
+            "tolerances: [tables.table9]: neither run has this table",
+            r#"table7: quaternions: strategy "quaternion-average" in the baseline, "lbs" now"#,
+            "table7: quaternions: takes null in the baseline, 2 now",
+        ]
+    );
+    assert_eq!(changes.verdict, Verdict::Unchanged, "said, and compared");
+    let mut noisy = base();
+    noisy.tables[0].sequences[0].variants[1].pose_noise =
+        Some(PoseNoise { degrees: 2.0, seed: 0, version: 1 });
+    let changes = by_default(&noisy);
+    assert_eq!(changes.verdict, Verdict::Incomplete);
+    assert!(
+        changes.notes[0].text.ends_with("poses without noise in the baseline, pose noise of 2 degrees (seed 0, version 1) now: not compared"),
+        "{:?}",
+        changes.notes
+    );
+}
+
+/// Frames of one name, of several cameras say, are each compared with the one in the same place.
+#[test]
+fn frames_of_one_name_are_told_apart() {
+    let alike = |mut results: Results| {
+        let of_all = results.tables.iter_mut().flat_map(|t| &mut t.sequences).flat_map(|s| &mut s.variants);
+        of_all.for_each(|variant| variant.frames.iter_mut().for_each(|frame| frame.name = "0001".to_owned()));
+        results
+    };
+    let changes = compare(&alike(base()), &alike(moved(-0.6)), &Tolerances::default());
+    assert_eq!((changes.verdict, changes.frames_moved), (Verdict::Regressed, 1));
+    assert_eq!(changes.frames[0].frame, "0001 (4)");
 }
 
 /// A document of the schema before has no digests of data, and is read.

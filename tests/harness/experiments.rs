@@ -235,7 +235,7 @@ fn stand_ins_never_carry_the_data_set_s_name() {
 fn wrong_files_are_refused_by_name_and_key() {
     let cases = [
         ("schema = 1", "schema = 2", "schema: 2; expected 1"),
-        ("title = \"Table 7\"", "title = 7", "table7.toml:4: invalid type: integer `7`, expected a string"),
+        ("title = \"Table 7\"", "title = 7", "table7.toml:4: integer `7`; expected text"),
         ("title = \"Table 7\"", "titel = \"x\"", "unknown field `titel`"),
         ("title = \"Table 7\"\n", "", "missing field `title`"),
         ("id = \"table7\"", "id = \"table8\"", "id: `table8` in table7.toml"),
@@ -257,7 +257,7 @@ fn wrong_files_are_refused_by_name_and_key() {
         (
             "recipe = \"surface-vertex\"",
             "recipe = \"cloud\"",
-            "unknown variant `cloud`, expected one of `surface-vertex`",
+            "unknown variant `cloud`; expected one of `surface-vertex`",
         ),
         ("recipe = \"surface-vertex\"", "recipe = \"surface-vertex\", size = 3", "unknown field `size`"),
         (
@@ -291,7 +291,7 @@ fn wrong_files_are_refused_by_name_and_key() {
             "caption = \"like GYMNASTS\"",
             "stand_in.caption: names `gymnasts`",
         ),
-        ("psnr = \"20.10\"", "psnr = 20.10", "invalid type: floating point `20.1`, expected a string"),
+        ("psnr = \"20.10\"", "psnr = 20.10", "a number `20.1`; expected text"),
         ("psnr = \"20.10\"", "psnr = \"20,10\"", "`20,10` is not a printed number"),
         (
             "{ sequence = \"bob\"",
@@ -301,8 +301,8 @@ fn wrong_files_are_refused_by_name_and_key() {
         ("variant = \"q\"", "variant = \"m\"", "`anna` / `m` twice"),
         ("paper = \"m\"", "paper = \"x\"", "variants[0].paper: `x`"),
         ("bold = [\"psnr\"]", "bold = [\"speed\"]", "unknown variant `speed`"),
-        ("psnr = \"20.10\"", "speed = \"20.10\"", "unknown variant `speed`, expected one of `psnr`"),
-        ("layout = \"rows\"", "layout = \"round\"", "unknown variant `round`, expected `rows` or `wide`"),
+        ("psnr = \"20.10\"", "speed = \"20.10\"", "unknown variant `speed`; expected one of `psnr`"),
+        ("layout = \"rows\"", "layout = \"round\"", "unknown variant `round`; expected `rows` or `wide`"),
     ];
     for (right, wrong, message) in cases {
         assert!(TABLE_7.contains(right), "{right}");

@@ -1,17 +1,23 @@
-//! What a folder holds: an export of an avatar, a subject in one of the layouts, renders of another program, or folders of them.
+//! What a folder holds: a run, an export of an avatar, a subject in one of the layouts, renders of another program, or folders of them.
 
-use super::{avatar_text, line, notes_text};
+use super::{avatar_text, json_text, line, notes_text, store_text};
+use crate::cli::products::AVATARS;
 use anyhow::{Result, bail};
 use skinsplat::run::renders::{self, RenderFolder};
+use skinsplat::run::{store, subject_notes};
 use skinsplat_core::scene::Camera;
 use skinsplat_data::avatar::read_avatar;
 use skinsplat_data::folder::{Options, is_subject};
 use skinsplat_data::layouts::{self, Contents, Request};
 use skinsplat_data::{FrameSource, Sequence, Subject, splatting_avatar};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Everything of a folder.
 pub(super) fn text(path: &Path) -> Result<String> {
+    let stores = store::stores(path)?;
+    if path.join("results.json").is_file() || !stores.is_empty() {
+        return run_text(path, &stores);
+    }
     if path.join(splatting_avatar::GAUSSIANS).is_file() || path.join("point_cloud").is_dir() {
         return Ok(avatar_text(&read_avatar(path)?));
     }
@@ -38,6 +44,25 @@ pub(super) fn text(path: &Path) -> Result<String> {
         path.display(),
         known.join(", ")
     )
+}
+
+/// A run of this program: its tables, if it is done, and its stores.
+fn run_text(path: &Path, stores: &[PathBuf]) -> Result<String> {
+    let mut text = line("kind", "run of reproduce");
+    let results = path.join("results.json");
+    text += &match results.is_file() {
+        true => json_text(&results)?,
+        false => line("results.json", "not there yet: no table is done"),
+    };
+    for file in stores {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        text += &(line("store", name) + &store_text(file)?);
+    }
+    let avatars = path.join(AVATARS);
+    // One checksum each.
+    let whole = |entry: &std::fs::DirEntry| entry.path().extension().is_some_and(|e| e == "sha256");
+    let made = std::fs::read_dir(&avatars).map_or(0, |dir| dir.flatten().filter(whole).count());
+    Ok(text + &line("avatars made", made))
 }
 
 /// A subject: what lies there, what is missing, and what is read of it.
@@ -67,7 +92,7 @@ fn loaded_text(subject: &Subject) -> String {
         text += &line("body model", format!("{vertices} vertices, {joints} joints"));
     }
     text += &subject.sequences().map(sequence_text).collect::<String>();
-    text + &notes_text(&subject.notes)
+    text + &notes_text(&subject_notes(subject))
 }
 
 fn sequence_text(sequence: &Sequence) -> String {

@@ -162,6 +162,9 @@ fn spread(rows: &[Row]) -> String {
     let comparable = |row: &&Row| row.protocol.region == Region::Full && row.over_another_background == 0;
     let summaries: Vec<&Summary> =
         rows.iter().filter(comparable).filter_map(|row| row.outcome.as_ref().ok()).collect();
+    if summaries.is_empty() {
+        return "No protocol of the whole image scores all of them over its own background".to_owned();
+    }
     let range = |id: MetricId| {
         let values = summaries.iter().filter_map(|summary| summary.value(id));
         let (low, high) =

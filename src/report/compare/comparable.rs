@@ -2,7 +2,10 @@
 
 use super::Note;
 use super::series::{Pair, Series};
-use crate::report::results::{Results, SequenceResults, TableResults};
+use crate::experiment::PoseNoise;
+use crate::report::results::{Results, SequenceResults, TableResults, VariantResults};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What is in both documents, and what is in one.
 #[derive(Default)]
@@ -48,11 +51,12 @@ impl<'a> Pairs<'a> {
 
     /// The sequences of a table that both have.
     fn sequences(&mut self, table: &'a TableResults, other: &'a TableResults, notes: &mut Vec<Note>) {
+        notes.extend(other_ways(table, other).into_iter().map(|text| Note { left_out: false, text }));
         for sequence in &table.sequences {
             match other.sequences.iter().find(|of_other| of_other.id == sequence.id) {
                 None => self.missing.extend(of_sequence(table, sequence)),
                 Some(of_other) => match other_data(sequence, of_other) {
-                    None => self.variants((table, sequence), (other, of_other)),
+                    None => self.variants((table, sequence), (other, of_other), notes),
                     Some(what) => {
                         let at = format!("{}: {}", table.experiment, sequence.id);
                         self.leave_out(format!("{at}: {what} of the same name: not compared"), notes);
@@ -70,9 +74,15 @@ impl<'a> Pairs<'a> {
         &mut self,
         (table, before): (&'a TableResults, &'a SequenceResults),
         (other, after): (&'a TableResults, &'a SequenceResults),
+        notes: &mut Vec<Note>,
     ) {
         for series in of_sequence(table, before) {
             match of_sequence(other, after).find(|of_other| of_other.variant.id == series.variant.id) {
+                Some(of_other) if of_other.variant.pose_noise != series.variant.pose_noise => {
+                    let at = format!("{}: {}: {}", table.experiment, before.id, series.variant.id);
+                    let [a, b] = [series, of_other].map(|series| noise(series.variant));
+                    self.leave_out(format!("{at}: {a} in the baseline, {b} now: not compared"), notes);
+                }
                 Some(of_other) => self.both.push(Pair { before: series, after: of_other }),
                 None => self.missing.push(series),
             }
@@ -129,6 +139,55 @@ fn other_data(before: &SequenceResults, after: &SequenceResults) -> Option<&'sta
         return Some("other test data (images, cameras, poses or body)");
     }
     (before.train != after.train).then_some("other training data")
+}
+
+/// The noise on the poses of a variant, in words that tell two apart.
+fn noise(variant: &VariantResults) -> String {
+    match &variant.pose_noise {
+        None => "poses without noise".to_owned(),
+        Some(PoseNoise { degrees, seed, version }) => {
+            format!("pose noise of {degrees} degrees (seed {seed}, version {version})")
+        }
+    }
+}
+
+/// What one id stands for in two versions of a table, where it is not the same: the numbers compare, and that may be why they moved.
+fn other_ways(table: &TableResults, other: &TableResults) -> Vec<String> {
+    let mut ways = Vec::new();
+    let at = &table.experiment;
+    if let (Some(before), Some(after)) = (&table.test_pose, &other.test_pose)
+        && before != after
+    {
+        let differ = "test poses are fitted with other options than in the baseline (`test_pose`)";
+        ways.push(format!("{at}: {differ}"));
+    }
+    let now: BTreeMap<&str, &VariantResults> = other
+        .sequences
+        .iter()
+        .flat_map(|s| &s.variants)
+        .map(|variant| (variant.id.as_str(), variant))
+        .collect();
+    let mut seen = BTreeSet::new();
+    for variant in table.sequences.iter().flat_map(|s| &s.variants).filter(|variant| seen.insert(&variant.id))
+    {
+        let Some(now) = now.get(variant.id.as_str()) else { continue };
+        for (what, a, b) in [
+            ("avatar", json(&variant.avatar), json(&now.avatar)),
+            ("SH degree", json(&variant.sh_degree), json(&now.sh_degree)),
+            ("strategy", json(&variant.strategy), json(&now.strategy)),
+            ("takes", json(&variant.takes), json(&now.takes)),
+        ] {
+            if a != b {
+                ways.push(format!("{at}: {}: {what} {a} in the baseline, {b} now", variant.id));
+            }
+        }
+    }
+    ways
+}
+
+/// A value as it stands in the documents.
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_default()
 }
 
 /// What differs between the runs, though their numbers compare.

@@ -233,6 +233,11 @@ pub struct Changes {
 /// Left out with a note: tables of another protocol or version, sequences of other data.
 pub fn compare(baseline: &Results, current: &Results, tolerances: &Tolerances) -> Changes {
     let mut changes = Changes::default();
+    let known = |id: &String| baseline.tables.iter().chain(&current.tables).any(|t| t.experiment == *id);
+    for id in tolerances.tables.keys().filter(|id| !known(id)) {
+        let text = format!("tolerances: [tables.{id}]: neither run has this table");
+        changes.notes.push(Note { left_out: false, text });
+    }
     let pairs = comparable(baseline, current, &mut changes.notes);
     for pair in &pairs.both {
         pair.compare(tolerances, &mut changes);

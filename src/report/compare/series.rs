@@ -37,10 +37,15 @@ impl<'a> Series<'a> {
         }
     }
 
-    /// The scored frames by name.
-    fn frames(&self) -> BTreeMap<&'a str, &'a FrameResult> {
-        let scored = self.variant.frames.iter().filter(|frame| frame.score.is_some());
-        scored.map(|frame| (frame.name.as_str(), frame)).collect()
+    /// The scored frames by name; of frames of one name (of several cameras, say) the second is `NAME (2)`.
+    fn frames(&self) -> BTreeMap<String, &'a FrameResult> {
+        let mut named: BTreeMap<&str, usize> = BTreeMap::new();
+        let of_all = self.variant.frames.iter().map(|frame| {
+            let nth = named.entry(&frame.name).or_default();
+            *nth += 1;
+            (if *nth == 1 { frame.name.clone() } else { format!("{} ({nth})", frame.name) }, frame)
+        });
+        of_all.filter(|(_, frame)| frame.score.is_some()).collect()
     }
 
     /// The aggregate over some of its frames, of poses as they are given or `fitted`; none if the protocol's code is not at hand, or
@@ -59,11 +64,11 @@ impl Pair<'_> {
     pub(super) fn compare(&self, tolerances: &Tolerances, changes: &mut Changes) {
         changes.compared += 1;
         let (before, after) = (self.before.frames(), self.after.frames());
-        let only = |a: &BTreeMap<&str, &FrameResult>, b: &BTreeMap<&str, &FrameResult>| -> Vec<String> {
-            a.keys().filter(|name| !b.contains_key(*name)).map(|&name| name.to_owned()).collect()
+        let only = |a: &BTreeMap<String, &FrameResult>, b: &BTreeMap<String, &FrameResult>| -> Vec<String> {
+            a.keys().filter(|name| !b.contains_key(*name)).cloned().collect()
         };
         let (lost, gained) = (only(&before, &after), only(&after, &before));
-        let shared: Vec<&str> = before.keys().filter(|name| after.contains_key(*name)).copied().collect();
+        let shared: Vec<&String> = before.keys().filter(|name| after.contains_key(*name)).collect();
         let whole = lost.is_empty() && gained.is_empty();
         for (frames, fate) in [(lost, Fate::Missing), (gained, Fate::New)] {
             if !frames.is_empty() {
@@ -75,11 +80,11 @@ impl Pair<'_> {
             return;
         }
         for fitted in [false, true] {
-            let of = |frames: &BTreeMap<&str, &FrameResult>, series: &Series<'_>| match (whole, fitted) {
+            let of = |frames: &BTreeMap<String, &FrameResult>, series: &Series<'_>| match (whole, fitted) {
                 (true, false) => series.variant.summary.clone(),
                 (true, true) => series.variant.fitted.clone(),
                 (false, _) => {
-                    let shared = shared.iter().filter_map(|name| frames.get(name).copied());
+                    let shared = shared.iter().filter_map(|name| frames.get(*name).copied());
                     series.over(&shared.collect::<Vec<_>>(), fitted)
                 }
             };
@@ -90,7 +95,7 @@ impl Pair<'_> {
             for metric in MetricId::all() {
                 for fitted in [false, true] {
                     let shown = Shown { metric, fitted };
-                    self.frame([before[name], after[name]], shown, tolerances, changes);
+                    self.frame(name, [before[name], after[name]], shown, tolerances, changes);
                 }
             }
         }
@@ -123,6 +128,7 @@ impl Pair<'_> {
     /// A number of a frame: it shows where a movement comes from, and counts by itself where that was asked for.
     fn frame(
         &self,
+        name: &str,
         [before, after]: [&FrameResult; 2],
         shown: Shown,
         tolerances: &Tolerances,
@@ -139,7 +145,7 @@ impl Pair<'_> {
             sequence: self.before.sequence.id.clone(),
             label: self.before.sequence.label.clone(),
             variant: self.before.variant.id.clone(),
-            frame: before.name.clone(),
+            frame: name.to_owned(),
             metric,
             fitted,
             baseline: a,
@@ -157,7 +163,7 @@ impl Pair<'_> {
                 baseline: Some(a),
                 current: Some(b),
                 tolerance: Some(tolerance),
-                frames: vec![before.name.clone()],
+                frames: vec![name.to_owned()],
                 ..self.before.line(Fate::Regressed)
             });
         }

@@ -1,5 +1,6 @@
 //! How far numbers may move: by metric, and by table where a file says so.
 
+use crate::toml_problem::TomlProblem;
 use serde::Deserialize;
 use skinsplat_metrics::MetricId;
 use std::collections::BTreeMap;
@@ -51,7 +52,7 @@ impl Tolerances {
     /// # Errors
     /// One line: what is wrong, where, and what was expected.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let file: File = toml::from_str(text).map_err(|error| one_line(&error))?;
+        let file: File = toml::from_str(text).map_err(|error| one_line(text, &error))?;
         let mut all = Allowed::default();
         for (key, value) in file.all {
             let metric = MetricId::from_id(&key).ok_or_else(|| {
@@ -95,8 +96,9 @@ impl Allowed {
     }
 }
 
-fn one_line(error: &toml::de::Error) -> String {
-    error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
+fn one_line(text: &str, error: &toml::de::Error) -> String {
+    let problem = TomlProblem::of(text, error);
+    format!("line {}: {} (at `{}`)", problem.line, problem.message(), problem.excerpt)
 }
 
 #[cfg(test)]

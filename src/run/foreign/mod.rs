@@ -54,6 +54,7 @@ pub fn on_body(loaded: LoadedAvatar, body: &RestBody) -> Result<OnBody, Error> {
         );
     }
     avatar.validate(Some(rest)).map_err(|error| DataError::scene(path, error))?;
+    notes.extend(few_joints(&avatar, rest).filter(|_| bound));
     match (&canonical, &mut avatar.binding) {
         (Canonical::Mesh(mesh), Binding::Face(binding)) => {
             avatar.gaussians.rotations =
@@ -70,6 +71,17 @@ pub fn on_body(loaded: LoadedAvatar, body: &RestBody) -> Result<OnBody, Error> {
         None => beside.exist().then(|| beside.read(body)).transpose()?,
     };
     Ok(OnBody { avatar, body: own, mesh, notes })
+}
+
+/// What has to be said of weights that leave half of the body's joints alone: joints are told by their number.
+fn few_joints(avatar: &Avatar, body: &RestBody) -> Option<String> {
+    let Binding::Vertex(weights) = &avatar.binding else { return None };
+    let last = (0..weights.len()).flat_map(|i| weights.row(i).0).max()?;
+    let (last, joints) = (usize::from(*last), body.skeleton.num_joints());
+    // Of a small rig few joints may be most of what there is.
+    (joints > 8 && 2 * (last + 1) <= joints).then(|| {
+        format!("its weights name joints 0 to {last} of the body's {joints}: made for another body?")
+    })
 }
 
 /// The body in the canonical pose of an avatar.
