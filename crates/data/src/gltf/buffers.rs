@@ -211,9 +211,9 @@ impl Source {
         let fractions = integers == Integers::Fractions || accessor.normalized();
         let unit = |one: f64| if fractions { one } else { 1.0 };
         fn over<T: Copy + Into<f64>, const N: usize>(rows: &[[T; N]], one: f64) -> Vec<[f64; N]> {
-            // -128 and -32768 stand for -1 too.
-            let least = if one == 1.0 { f64::MIN } else { -1.0 };
-            rows.iter().map(|row| row.map(|v| (v.into() / one).max(least))).collect()
+            // -128 and -32768 stand for -1 too. A number that is none stays none.
+            let value = |v: T| if one == 1.0 { v.into() } else { (v.into() / one).max(-1.0) };
+            rows.iter().map(|row| row.map(value)).collect()
         }
         let kind = accessor.data_type();
         Ok(match kind {
