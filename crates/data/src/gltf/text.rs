@@ -26,6 +26,12 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, ::gltf::Error> {
     if !bytes.starts_with(b"glTF") {
         return Ok((Cow::Borrowed(bytes), None));
     }
+    // The crate subtracts its header's 12 bytes from the stated length unseen.
+    let stated = bytes.get(8..12).and_then(|field| Some(u32::from_le_bytes(field.try_into().ok()?)));
+    if let Some(length @ ..12) = stated {
+        let length_read = bytes.len();
+        return Err(::gltf::Error::Binary(::gltf::binary::Error::Length { length, length_read }));
+    }
     let glb = ::gltf::binary::Glb::from_slice(bytes)?;
     Ok((glb.json, glb.bin.map(Cow::into_owned)))
 }
