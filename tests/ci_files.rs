@@ -3,10 +3,12 @@
 
 #[path = "support/program.rs"]
 mod program;
+mod support;
 
-use program::{Answer, Desk};
+use program::{Answer, Desk, copy};
 use std::path::Path;
 use std::process::Command;
+use support::data;
 
 const ACTION: &str = include_str!("../ci/action.yml");
 const GITLAB: &str = include_str!("../ci/gitlab.yml");
@@ -42,8 +44,10 @@ fn bash(desk: &Desk, script: &str, environment: &[(&str, &str)]) -> Answer {
 /// A project with an experiment, its baseline, and one that is worse than it.
 fn project() -> Desk {
     let desk = Desk::new();
-    desk.put("mine.toml", include_str!("cli/tiny.toml").replace("id = \"tiny\"", "id = \"mine\""));
-    desk.ok(args!["run", "mine.toml", "--limit", "1", "--out", "first", "-q"]);
+    let table = include_str!("cli/tiny.toml").replace("id = \"tiny\"", "id = \"mine\"");
+    desk.put("mine.toml", table.replace("snapshot_ava", "tiny"));
+    copy(&data("small/tiny"), &desk.path("data/tiny"));
+    desk.ok(args!["run", "mine.toml", "--data", "data", "--limit", "1", "--out", "first", "-q"]);
     let results = desk.read("first/results.json");
     desk.put("baseline.json", &results);
     let mut better: serde_json::Value = serde_json::from_str(&results).unwrap();
@@ -57,7 +61,7 @@ fn project() -> Desk {
 fn the_steps_of_the_action_run_and_carry_the_verdict() {
     let desk = project();
     bash(&desk, &step("install"), &[("VERSION", "skinsplat")]).exits(0, "installed");
-    let run = [("EXPERIMENTS", "mine.toml"), ("ARGUMENTS", "--limit 1")];
+    let run = [("EXPERIMENTS", "mine.toml"), ("ARGUMENTS", "--limit 1 --data data")];
     bash(&desk, &step("run"), &run).exits(0, "run");
     assert!(desk.read("skinsplat-ci/page.html").starts_with("<!DOCTYPE html>"));
     for (baseline, code) in [("baseline.json", "0"), ("better.json", "1")] {
@@ -79,7 +83,7 @@ fn the_script_of_the_gitlab_job_runs_and_carries_the_verdict() {
     for (baseline, code) in [("baseline.json", 0), ("better.json", 1)] {
         let environment = [
             ("EXPERIMENTS", "mine.toml"),
-            ("ARGUMENTS", "--limit 1"),
+            ("ARGUMENTS", "--limit 1 --data data"),
             ("BASELINE", baseline),
             ("TOLERANCES", ""),
             ("COMPARISON", ""),

@@ -4,13 +4,18 @@
 
 #[path = "support/program.rs"]
 mod program;
+mod support;
 
-use program::{Answer, Desk, contents};
+use program::{Answer, Desk, contents, copy};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-const TABLE: &str = include_str!("cli/tiny.toml");
+/// Puts a table of two variants on a desk, and the small subject that it is of.
+fn put_table(desk: &Desk, file: &str) {
+    desk.put(file, include_str!("cli/tiny.toml").replace("snapshot_ava", "tiny"));
+    copy(&support::data("small/tiny"), &desk.path("data/tiny"));
+}
 
 /// What a run leaves for its reader, by name.
 fn tables(desk: &Desk, out: &str) -> Vec<(String, Vec<u8>)> {
@@ -62,8 +67,8 @@ fn the_script_for_slurm_runs_slices_and_merges() {
     let desk = Desk::new();
     // A name that a shell would take apart.
     let (file, out) = ("a 'b' $HOME \"c\"/tiny.toml", "runs/50% o'clock");
-    desk.put(file, TABLE);
-    desk.ok(args!["run", file, "--limit", "1", "--out", "whole", "-q"]);
+    put_table(&desk, file);
+    desk.ok(args!["run", file, "--data", "data", "--out", "whole", "-q"]);
     let sbatch = desk.put("bin/sbatch", SBATCH);
     std::fs::set_permissions(&sbatch, std::fs::Permissions::from_mode(0o755)).unwrap();
     let asked = args![
@@ -77,7 +82,7 @@ fn the_script_for_slurm_runs_slices_and_merges() {
         "--out",
         out
     ];
-    let script = desk.ok([asked, args!["--", file, "--limit", "1", "-q"]].concat());
+    let script = desk.ok([asked, args!["--", file, "--data", "data", "-q"]].concat());
     assert!(!desk.path(out).exists() && !desk.path("asked").exists(), "it only prints");
     bash(&desk, &script, &desk.path("bin"), &[]).exits(0, &script);
     assert_same_tables(&desk, "whole", out);
@@ -109,10 +114,10 @@ fn the_script_for_gnu_parallel_runs_slices_and_merges() {
         return;
     }
     let desk = Desk::new();
-    desk.put("ti ny/tiny.toml", TABLE);
-    desk.ok(args!["run", "ti ny/tiny.toml", "--limit", "1", "--out", "whole", "-q"]);
+    put_table(&desk, "ti ny/tiny.toml");
+    desk.ok(args!["run", "ti ny/tiny.toml", "--data", "data", "--out", "whole", "-q"]);
     let asked = args!["batch", "array", "--shards", "3", "--jobs", "2", "--out", "o'ut"];
-    let script = desk.ok([asked, args!["--", "ti ny/tiny.toml", "--limit", "1"]].concat());
+    let script = desk.ok([asked, args!["--", "ti ny/tiny.toml", "--data", "data"]].concat());
     bash(&desk, &script, &desk.path(""), &[]).exits(0, &script);
     assert_same_tables(&desk, "whole", "o'ut");
 }

@@ -21,6 +21,17 @@ fn desk() -> Desk {
     desk
 }
 
+/// The subject's place.
+const SMALL: [&str; 2] = ["--data", "data"];
+
+/// A desk with the table on a subject of 32 pixels, for what does not depend on sizes.
+fn small_desk() -> Desk {
+    let desk = Desk::new();
+    desk.put("tiny.toml", TABLE.replace("snapshot_ava", "tiny"));
+    copy(&support::data("small/tiny"), &desk.path("data/tiny"));
+    desk
+}
+
 fn arguments(out: &str, more: &[&str]) -> Vec<OsString> {
     let mut all = args!["run", "tiny.toml", "--out", out];
     all.extend(more.iter().map(OsString::from));
@@ -65,22 +76,22 @@ fn assert_nothing_twice(keys: &[String]) {
 
 #[test]
 fn a_second_run_renders_nothing_and_changes_nothing() {
-    let desk = desk();
-    let first = run(&desk, "run", &[]);
-    assert_eq!(rendered(&desk, "run"), 6);
+    let desk = small_desk();
+    let first = run(&desk, "run", &SMALL);
+    assert_eq!(rendered(&desk, "run"), 3);
     let names: Vec<String> = products(&desk, "run").into_iter().map(|file| file.0).collect();
     assert_eq!(names.len(), 6, "{names:?}");
     for name in ["results.json", "tables.md", "tiny.csv", "tiny.tex"] {
         assert!(names.iter().any(|n| n == name), "{name} in {names:?}");
     }
     let (before, store) = (products(&desk, "run"), desk.read("run/frames.jsonl"));
-    let second = run(&desk, "run", &[]);
+    let second = run(&desk, "run", &SMALL);
     assert_eq!((rendered(&desk, "run"), first.out), (0, second.out));
     assert!(products(&desk, "run") == before && desk.read("run/frames.jsonl") == store);
     // Another avatar folder is rebuilt, bit for bit.
     std::fs::remove_dir_all(desk.path("run/avatars")).unwrap();
-    run(&desk, "run", &["--fresh"]);
-    assert_eq!(rendered(&desk, "run"), 6);
+    run(&desk, "run", &[&SMALL[..], &["--fresh"]].concat());
+    assert_eq!(rendered(&desk, "run"), 3);
     assert!(products(&desk, "run") == before);
 }
 
@@ -90,14 +101,18 @@ fn threads_and_places_do_not_show() {
     run(&desk, "one", &["--threads", "1"]);
     run(&desk, "two", &["--threads", "2"]);
     assert_equal(&desk, "one", "two");
-    // Another folder, another path to the experiment, another path for the output.
-    let elsewhere = Desk::new();
-    elsewhere.put("deep/tiny.toml", TABLE);
-    elsewhere.ok(args!["run", elsewhere.path("deep/tiny.toml"), "--out", elsewhere.path("a/b/c")]);
-    assert!(products(&elsewhere, "a/b/c") == products(&desk, "one"));
-    let results = desk.read("one/results.json");
-    for trace in [desk.path("").display().to_string(), "unix".into(), "seconds".into()] {
-        assert!(!results.contains(&trace), "{trace}");
+    // Another folder, another path to the experiment, another path for the output, another path to the data.
+    let (here, elsewhere) = (small_desk(), small_desk());
+    run(&here, "run", &SMALL);
+    let experiment = elsewhere.put("deep/tiny.toml", elsewhere.read("tiny.toml"));
+    let (out, data) = (elsewhere.path("a/b/c"), elsewhere.path("data"));
+    elsewhere.ok(args!["run", experiment, "--data", data, "--out", out]);
+    assert!(products(&elsewhere, "a/b/c") == products(&here, "run"));
+    for (desk, out) in [(&desk, "one"), (&here, "run"), (&elsewhere, "a/b/c")] {
+        let results = desk.read(&format!("{out}/results.json"));
+        for trace in [desk.path("").display().to_string(), "unix".into(), "seconds".into()] {
+            assert!(!results.contains(&trace), "{trace}");
+        }
     }
 }
 
@@ -153,17 +168,12 @@ fn assert_same_tables(desk: &Desk, a: &str, b: &str) {
 
 #[test]
 fn shards_merge_to_the_same_tables() {
-    let desk = desk();
+    let desk = small_desk();
     // A fit besides, whose way is drawn too.
-    desk.put(
-        "tiny.toml",
-        TABLE.replacen("surface-vertex\" }", "fit\", name = \"hugs-skinned\" }", 1).replacen(
-            "sh_degree = 1\n",
-            "",
-            1,
-        ),
-    );
-    let more = ["--fit-iterations", "2", "--limit", "3"];
+    let table = desk.read("tiny.toml");
+    let fit = table.replacen("surface-vertex\" }", "fit\", name = \"hugs-skinned\" }", 1);
+    desk.put("tiny.toml", fit.replacen("sh_degree = 1\n", "", 1));
+    let more = [SMALL[0], SMALL[1], "--fit-iterations", "2", "--limit", "3"];
     let whole = run(&desk, "whole", &more);
     for shard in ["1/3", "2/3", "3/3"] {
         let own = format!("own-{}", &shard[..1]);
@@ -178,6 +188,7 @@ fn shards_merge_to_the_same_tables() {
     assert_nothing_twice(&keys);
     // From one folder into itself, and from three into a fourth, without data and experiment.
     std::fs::remove_file(desk.path("tiny.toml")).unwrap();
+    std::fs::remove_dir_all(desk.path("data")).unwrap();
     assert_eq!(desk.ok(args!["merge", "shared"]), whole.out);
     assert_same_tables(&desk, "whole", "shared");
     for again in 0..2 {
@@ -193,12 +204,13 @@ fn shards_merge_to_the_same_tables() {
 
 #[test]
 fn other_settings_redo_only_what_they_change() {
-    let desk = desk();
-    run(&desk, "run", &["--limit", "1"]);
-    assert_eq!(rendered(&desk, "run"), 2);
-    run(&desk, "run", &["--limit", "2"]);
-    assert_eq!(rendered(&desk, "run"), 2);
-    run(&desk, "run", &["--limit", "2", "--all-strategies"]);
+    let desk = small_desk();
+    let run = |more: &[&str]| run(&desk, "run", &[&SMALL[..], more].concat());
+    run(&["--limit", "1"]);
+    assert_eq!(rendered(&desk, "run"), 1);
+    run(&["--limit", "2"]);
+    assert_eq!(rendered(&desk, "run"), 1);
+    run(&["--limit", "2", "--all-strategies"]);
     assert_nothing_twice(&keys(&desk.read("run/frames.jsonl")));
     let page = desk.read("run/tables.md");
     // Those of the table's own variants have a row already.
@@ -206,39 +218,38 @@ fn other_settings_redo_only_what_they_change() {
     for preset in skinsplat_posing::PRESETS.iter().filter(|preset| !shown.contains(&preset.id)) {
         assert!(page.contains(preset.title), "{} in {page}", preset.title);
     }
-    desk.put("tiny.toml", TABLE.replace("avatar-v1", "hugs-full"));
-    run(&desk, "run", &["--limit", "1"]);
-    assert_eq!(rendered(&desk, "run"), 2);
+    desk.put("tiny.toml", desk.read("tiny.toml").replace("avatar-v1", "hugs-full"));
+    run(&["--limit", "1"]);
+    assert_eq!(rendered(&desk, "run"), 1);
     assert!(desk.read("run/tables.md").contains("Protocol: hugs-full, version 1."));
 }
 
 #[test]
 fn a_folder_of_ones_own_and_a_frame_that_fails() {
-    let desk = desk();
-    copy(&support::data("blender"), &desk.path("data"));
-    run(&desk, "whole", &["--data", "data"]);
-    let image = desk.path("data/datasets/snapshot_ava/test_twist/images/image_0010.png");
+    let desk = small_desk();
+    run(&desk, "whole", &SMALL);
+    let image = desk.path("data/tiny/test_b/images/image_0001.png");
     let bytes = std::fs::read(&image).unwrap();
     std::fs::write(&image, &bytes[..bytes.len() / 2]).unwrap();
 
-    let answer = desk.run(arguments("run", &["--data", "data"])).exits(3, "a damaged frame");
+    let answer = desk.run(arguments("run", &SMALL)).exits(3, "a damaged frame");
     assert!(answer.err.contains("2 scores are missing"), "{}", answer.err);
     let page = desk.read("run/tables.md");
-    assert!(page.contains("image_0010"), "{page}");
+    assert!(page.contains("image_0001"), "{page}");
     let results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
     let sequences = results["tables"][0]["sequences"].as_array().unwrap();
     let frames = |sequence: &Value| sequence["variants"][0]["frames"].as_array().unwrap().clone();
     let scored = |frames: Vec<Value>| frames.iter().filter(|frame| !frame["score"].is_null()).count();
-    assert_eq!(sequences.iter().map(|s| scored(frames(s))).sum::<usize>(), 5);
+    assert_eq!(sequences.iter().map(|s| scored(frames(s))).sum::<usize>(), 2);
     let failed: Vec<Value> =
         sequences.iter().flat_map(frames).filter(|frame| frame["score"].is_null()).collect();
     assert_eq!(failed.len(), 1);
     let problem = failed[0]["error"].as_str().unwrap();
-    assert!(problem.contains("image_0010.png") && !problem.contains('\n'), "{problem}");
+    assert!(problem.contains("image_0001.png") && !problem.contains('\n'), "{problem}");
     // The report of it says the same, and repaired data repairs the run.
     assert_eq!(desk.run(args!["report", "run"]).exits(3, "report").out, page);
     std::fs::write(&image, bytes).unwrap();
-    run(&desk, "run", &["--data", "data"]);
+    run(&desk, "run", &SMALL);
     assert_equal(&desk, "whole", "run");
 }
 

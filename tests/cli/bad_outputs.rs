@@ -3,6 +3,8 @@
 use crate::args;
 use crate::made_up::desk;
 use crate::program::{Answer, Desk};
+use crate::support::data;
+use std::ffi::OsString;
 use std::path::Path;
 
 fn render(desk: &Desk, out: &Path) -> Answer {
@@ -40,6 +42,11 @@ fn images_and_avatars() {
     render(&desk, Path::new("a")).refuses(&[".png or .npy"], "no format");
 }
 
+/// A run of one frame.
+fn run(out: &str) -> Vec<OsString> {
+    args!["run", "small.toml", "--data", data("small"), "--variant", "surface", "--limit", "1", "--out", out]
+}
+
 /// A full disk: the device stays a device, and a link to it stays a link.
 #[cfg(target_os = "linux")]
 #[test]
@@ -58,20 +65,19 @@ fn a_full_disk() {
     }
     assert!(!std::fs::metadata("/dev/full").unwrap().is_file());
     // A results store on a full disk.
-    desk.put("tiny.toml", include_str!("tiny.toml"));
+    desk.put("small.toml", include_str!("small.toml"));
     std::fs::create_dir(desk.path("run")).unwrap();
     std::os::unix::fs::symlink("/dev/full", desk.path("run/frames.jsonl")).unwrap();
-    let run = args!["run", "tiny.toml", "--out", "run", "--limit", "1"];
-    desk.run(run).refuses(&["frames.jsonl"], "store");
+    desk.run(run("run")).refuses(&["frames.jsonl"], "store");
     assert!(!desk.path("run/results.json").exists());
 }
 
 #[test]
 fn folders_of_runs() {
     let desk = desk();
-    desk.put("tiny.toml", include_str!("tiny.toml"));
+    desk.put("small.toml", include_str!("small.toml"));
     let before = desk.contents();
-    let run = |out: &str| desk.run(args!["run", "tiny.toml", "--limit", "1", "--out", out]);
+    let run = |out: &str| desk.run(self::run(out));
     run("avatar.ply").refuses(&["avatar.ply", "cannot make the folder"], "a file");
     run("avatar.ply/run").refuses(&["avatar.ply/run", "cannot make the folder"], "below a file");
     run("/proc/run").refuses(&["/proc/run", "cannot make the folder"], "nobody may write");
@@ -79,6 +85,5 @@ fn folders_of_runs() {
     desk.put("run/frames.jsonl", "something else\n");
     run("run").refuses(&["run/frames.jsonl:1", "not a results store"], "a foreign file");
     assert_eq!(desk.read("run/frames.jsonl"), "something else\n");
-    let fresh = args!["run", "tiny.toml", "--limit", "1", "--out", "run", "--fresh"];
-    desk.run(fresh).exits(0, "--fresh");
+    desk.run([self::run("run"), args!["--fresh"]].concat()).exits(0, "--fresh");
 }

@@ -3,14 +3,14 @@
 use crate::args;
 use crate::made_up;
 use crate::program::Desk;
+use crate::reports::finished;
 use crate::support::{data, fixture};
 use serde_json::Value;
 
 #[test]
 fn inspect_tells_what_each_kind_of_file_holds() {
-    let desk = made_up::desk();
-    desk.put("tiny.toml", include_str!("tiny.toml"));
-    desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1"]);
+    let desk = finished();
+    made_up::put(&desk);
     let subject = data("blender/datasets/snapshot_ava");
     let sequence = subject.join("test_twist");
     for (path, parts) in [
@@ -128,7 +128,7 @@ fn a_plan_counts_what_is_left_and_touches_nothing() {
     assert!(text.ends_with("1 avatars\n2 frames, 2 of them still to do\n"), "{text}");
     assert!(desk.contents() == before);
 
-    desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1"]);
+    let desk = finished();
     assert!(desk.ok(plan.clone()).ends_with("2 frames, 0 of them still to do\n"));
     let mut shard = plan.clone();
     shard.extend(args!["--shard", "1/2"]);

@@ -2,7 +2,7 @@
 
 use crate::args;
 use crate::program::Desk;
-use crate::support::{fixture, json};
+use crate::support::{data, fixture, json};
 use serde_json::Value;
 use skinsplat_lpips_alex::SAFETENSORS as ALEX_BYTES;
 use skinsplat_metrics::{LpipsNet, PROTOCOLS};
@@ -68,8 +68,13 @@ fn weights_that_are_wrong_are_refused() {
         desk.run(args!["score", fixture(PAIR[0]), fixture(PAIR[1]), "--lpips-weights", "bad.safetensors"])
             .refuses(&all, parts[0]);
     }
-    desk.run(args!["run", "--lpips-weights", "bad.safetensors"]).refuses(&["lin.4.weight"], "run");
-    desk.run(args!["plan", "--lpips-weights", "none.safetensors"]).refuses(&["none.safetensors"], "no file");
+    desk.put("small.toml", include_str!("small.toml"));
+    for (command, weights, part) in
+        [("run", "bad.safetensors", "lin.4.weight"), ("plan", "none.safetensors", "none.safetensors")]
+    {
+        let small = args![command, "small.toml", "--data", data("small"), "--lpips-weights", weights];
+        desk.run(small).refuses(&[part], command);
+    }
 }
 
 #[test]

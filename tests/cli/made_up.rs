@@ -115,9 +115,14 @@ pub(super) fn camera() -> serde_json::Value {
 /// A desk with `avatar.ply`, `body.npz`, `poses.npz` and `camera.json`.
 pub(super) fn desk() -> Desk {
     let desk = Desk::new();
+    put(&desk);
+    desk
+}
+
+/// Puts these four files on a desk.
+pub(super) fn put(desk: &Desk) {
     desk.put("avatar.ply", Ply::bound().text());
     write_npz(&desk.path("body.npz"), &body());
     write_npz(&desk.path("poses.npz"), &poses());
     desk.put("camera.json", camera().to_string());
-    desk
 }

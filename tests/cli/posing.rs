@@ -4,6 +4,7 @@ use crate::args;
 use crate::made_up;
 use crate::program::Desk;
 use crate::rendering::differences;
+use crate::reports::finished;
 use crate::support::data;
 use skinsplat_core::scene::Binding;
 use skinsplat_data::ply;
@@ -15,9 +16,7 @@ use std::sync::OnceLock;
 fn avatar() -> PathBuf {
     static DESK: OnceLock<(Desk, PathBuf)> = OnceLock::new();
     let make = || {
-        let desk = Desk::new();
-        desk.put("tiny.toml", include_str!("tiny.toml"));
-        desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1", "--variant", "skinned"]);
+        let desk = finished();
         let files = std::fs::read_dir(desk.path("run/avatars")).unwrap().map(|file| file.unwrap().path());
         let mut avatars = files.filter(|path| path.extension().is_some_and(|extension| extension == "ply"));
         let path = avatars.next().unwrap();

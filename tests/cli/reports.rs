@@ -1,17 +1,22 @@
 //! `report`: formats, and the comparison with a baseline.
 
 use crate::args;
-use crate::program::Desk;
+use crate::program::{Desk, Kept};
 use crate::schema::violation;
 use crate::support::data;
 use serde_json::Value;
+use std::sync::LazyLock;
 
-fn finished() -> Desk {
-    let desk = Desk::new();
-    desk.put("tiny.toml", include_str!("tiny.toml"));
-    let page = desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1"]);
-    assert_eq!(page, desk.read("run/tables.md"));
-    desk
+/// A desk with `tiny.toml` and its run of one frame per sequence in `run`.
+pub(super) fn finished() -> Desk {
+    static RUN: LazyLock<Kept> = LazyLock::new(|| {
+        let desk = Desk::new();
+        desk.put("tiny.toml", include_str!("tiny.toml"));
+        let page = desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "1"]);
+        assert_eq!(page, desk.read("run/tables.md"));
+        desk.kept()
+    });
+    RUN.desk()
 }
 
 #[test]
@@ -175,9 +180,8 @@ fn what_is_no_result_is_named() {
 /// Metrics that no column shows are not computed, and the others keep their bits.
 #[test]
 fn only_metrics_with_a_column_are_computed() {
-    let desk = Desk::new();
-    let tiny = include_str!("tiny.toml");
-    desk.put("tiny.toml", tiny);
+    let desk = finished();
+    let tiny = desk.read("tiny.toml");
     desk.put(
         "one.toml",
         tiny.replace("id = \"tiny\"", "id = \"one\"")
@@ -221,9 +225,11 @@ fn fitted_test_poses_are_told_wherever_scores_are() {
     let desk = Desk::new();
     let fitted = include_str!("tiny.toml")
         .replace("id = \"tiny\"", "id = \"fitted\"")
+        .replace("snapshot_ava", "tiny")
         .replace("layout =", "test_poses = \"fitted\"\ntest_pose = { steps = 2 }\nlayout =");
     desk.put("fitted.toml", &fitted);
-    desk.ok(args!["run", "fitted.toml", "--out", "run", "--limit", "1", "--html", "page.html"]);
+    let run = args!["run", "fitted.toml", "--data", data("small"), "--out", "run", "--limit", "1"];
+    desk.ok([run, args!["--html", "page.html"]].concat());
     let schema: Value = serde_json::from_str(include_str!("../../reports/schema/results.json")).unwrap();
     let results: Value = serde_json::from_str(&desk.read("run/results.json")).unwrap();
     assert_eq!(violation(&schema, &results), None);

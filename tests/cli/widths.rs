@@ -22,8 +22,6 @@ fn no_width_of_vectors_changes_a_byte() {
         "quick",
         "--iterations",
         "3",
-        "--test-every",
-        "2",
         "--out",
         "ava.ply",
         "--quiet",

@@ -78,6 +78,31 @@ impl Desk {
     pub fn contents(&self) -> Vec<(PathBuf, Option<Vec<u8>>)> {
         contents(self.folder.path())
     }
+
+    /// What is on the desk, for tests that all begin there.
+    pub fn kept(&self) -> Kept {
+        let here = |path: PathBuf| path.strip_prefix(self.folder.path()).unwrap().to_owned();
+        Kept(self.contents().into_iter().map(|(path, bytes)| (here(path), bytes)).collect())
+    }
+}
+
+/// What a desk held: a run that many tests look at is made once.
+pub struct Kept(Vec<(PathBuf, Option<Vec<u8>>)>);
+
+impl Kept {
+    /// Another desk with the same on it.
+    pub fn desk(&self) -> Desk {
+        let desk = Desk::new();
+        for (path, bytes) in &self.0 {
+            let path = desk.folder.path().join(path);
+            // A folder comes before what is in it.
+            match bytes {
+                Some(bytes) => std::fs::write(path, bytes).unwrap(),
+                None => std::fs::create_dir(path).unwrap(),
+            }
+        }
+        desk
+    }
 }
 
 /// Every file and folder below a folder, sorted, with the bytes of the files.
