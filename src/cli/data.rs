@@ -6,7 +6,7 @@ use skinsplat::experiment::{AvatarRecipe, Experiment, Unreadable};
 use skinsplat::run::{Library, LoadedDataset, RegisteredAvatar};
 use skinsplat_core::choice::one_of;
 use skinsplat_data::folder::Options;
-use skinsplat_data::{Error, Subject};
+use skinsplat_data::{Error, Gender, Subject};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -95,6 +95,18 @@ impl Data {
             }
         }
         Ok(found)
+    }
+
+    /// `DATASET/SUBJECT` with the body of each gender of which there is one.
+    pub(super) fn in_genders(&self, name: &str) -> Vec<(Gender, Subject)> {
+        let Some((dataset, subject)) = name.split_once('/') else { return Vec::new() };
+        let Ok(registry) = self.registry() else { return Vec::new() };
+        let dataset = registry.datasets.iter().find(|candidate| candidate.id == dataset);
+        let load = |gender| {
+            let options = Options { gender: Some(gender), ..self.options() };
+            Some((gender, dataset?.load_one(subject, &options).ok()?))
+        };
+        Gender::ALL.into_iter().filter_map(load).collect()
     }
 
     /// `DATASET/SUBJECT` of the first subject that is there.

@@ -1,11 +1,18 @@
 #![doc = include_str!("../README.md")]
 
+mod bodies;
+mod edges;
 mod findings;
+mod genders;
 mod lens;
+mod masks;
 mod overlays;
+mod parts;
 mod shadows;
+mod timing;
 mod zoom;
 
+pub use genders::of_another_gender;
 pub use overlays::write as write_overlays;
 
 use rayon::prelude::*;
@@ -76,21 +83,35 @@ impl Finding {
         Self { kind, sequence: sequence.to_owned(), detail: detail.into(), spoils: kind.spoils() }
     }
 
-    /// The finding behind a subject that cannot be loaded: no number can be made from it. What is not there, or is about
-    /// nothing in particular, is missing.
+    /// The finding behind a subject that cannot be loaded: no number can be made from it. Told by the field that the error is about, else
+    /// by the file; what is not there, or is about nothing in particular, is missing.
     pub fn of_error(error: &Error) -> Self {
-        let field = error.field();
-        let is = |words: &[&str]| words.iter().any(|word| field.contains(word));
-        let kind = match field {
-            _ if matches!(error, Error::Read { .. }) => Kind::MissingFrames,
-            _ if is(&["poses", "thetas", "body_pose", "global_orient", "transl"]) => Kind::PoseCount,
-            _ if is(&["betas", "shapedirs"]) => Kind::BetasSize,
-            _ if is(&["camera", "intrinsic", "extrinsic", "w2c"]) => Kind::Camera,
-            _ if is(&["gender", "model", "body", "weights", "v_template"]) => Kind::WrongGenderOrModel,
-            _ => Kind::MissingFrames,
-        };
-        Self { spoils: true, ..Self::new(kind, "", error.to_string()) }
+        let named = |name: Option<&std::ffi::OsStr>| name.map_or(String::new(), |name| name.to_string_lossy().into());
+        let places = [error.field().to_owned(), named(error.path().file_name())];
+        let folder = named(error.path().parent().and_then(|folder| folder.file_name()));
+        let kind = places.iter().chain([&folder]).find_map(|name| kind_of(&name.to_lowercase()));
+        Self { spoils: true, ..Self::new(kind.unwrap_or(Kind::MissingFrames), "", error.to_string()) }
     }
+}
+
+/// What a field, a file or a folder of this name is about.
+fn kind_of(name: &str) -> Option<Kind> {
+    const WORDS: [(Kind, &[&str]); 5] = [
+        (Kind::BetasSize, &["betas", "shapedirs", "mean_shape"]),
+        (Kind::Camera, &["camera", "intrinsic", "extrinsic", "w2c", "focal"]),
+        (
+            Kind::PoseCount,
+            &["pose", "theta", "global_orient", "trans", "smpl_o", "alignments", "scale", "expression", "mesh-f"],
+        ),
+        (Kind::MissingFrames, &["image", "mask", "frame", "depth", "background", "video"]),
+        (
+            Kind::WrongGenderOrModel,
+            &["gender", "model", "body", "weights", "v_template", "v_personal", "consensus", "regressor", "rig", "smpl_", "smplx_"],
+        ),
+    ];
+    // X-Humans has its poses in a folder of this name.
+    let told = || WORDS.iter().find(|(_, words)| words.iter().any(|word| name.contains(word))).map(|(kind, _)| *kind);
+    if name == "smplx" { Some(Kind::PoseCount) } else { told() }
 }
 
 /// How well one frame fits.
@@ -163,7 +184,7 @@ pub fn sequence(sequence: &Sequence, frames: &[usize]) -> (SequenceFit, Vec<Find
     let overlaps: Vec<f64> = seen.iter().filter_map(overlap).collect();
     let mean_iou = (!overlaps.is_empty()).then(|| overlaps.iter().sum::<f64>() / overlaps.len() as f64);
     let fit = SequenceFit { id: sequence.id.clone(), frames: seen.iter().map(frame).collect(), mean_iou };
-    (fit, findings::of(sequence, &seen))
+    (fit, findings::of(sequence, &small, &seen))
 }
 
 fn look(small: &Sequence, index: usize) -> Seen {

@@ -34,6 +34,9 @@ pub(crate) enum Family {
 }
 
 impl Gender {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Female, Self::Male, Self::Neutral];
+
     /// The gender of this name, in any case.
     pub(crate) fn named(name: &str) -> Option<Self> {
         match name.trim().to_ascii_lowercase().as_str() {
@@ -50,7 +53,8 @@ impl Gender {
         words.filter(|word| word.len() > 1).find_map(Self::named)
     }
 
-    fn word(self) -> &'static str {
+    /// What it is called, in one word.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Female => "female",
             Self::Male => "male",
@@ -62,7 +66,7 @@ impl Gender {
 impl Family {
     /// File names without extension, as the models are distributed.
     fn file_stems(self, gender: Gender) -> Vec<String> {
-        let word = gender.word();
+        let word = gender.name();
         let upper = word.to_ascii_uppercase();
         match self {
             Self::Smplx => vec![format!("SMPLX_{upper}")],
@@ -164,16 +168,16 @@ impl<'a> Models<'a> {
         let asked = self.options.gender;
         let given = self.options.model.as_deref().is_some_and(|model| model == path);
         let own = Gender::in_name(&listing::stem(path)).or(asked.filter(|_| !given))?;
-        let word = own.word();
+        let word = own.name();
         match asked {
             Some(asked) if asked != own => Some(format!(
                 "a {word} body, which the registry gives; the table asks for the {} one",
-                asked.word()
+                asked.name()
             )),
             Some(_) if own != subject => {
-                Some(format!("the {word} body, as the table asks; the subject is {}", subject.word()))
+                Some(format!("the {word} body, as the table asks; the subject is {}", subject.name()))
             }
-            None if own != subject => Some(format!("a {word} body; the subject is {}", subject.word())),
+            None if own != subject => Some(format!("a {word} body; the subject is {}", subject.name())),
             _ => None,
         }
     }
@@ -208,7 +212,7 @@ impl<'a> Models<'a> {
                 Some(model) => model.display().to_string(),
                 None => "models/ of the subject's folder or of one of the two above it".to_owned(),
             };
-            let problem = format!("no {} body", gender.word());
+            let problem = format!("no {} body", gender.name());
             Error::invalid(source, "model", problem, format!("{}.npz or .pkl in {place}", stems[0]))
         })
     }
