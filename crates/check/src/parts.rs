@@ -68,6 +68,6 @@ pub(super) fn misfits(sequence: &Sequence, pairs: &[Pair<'_>]) -> Option<Finding
         overlaps.len(),
         sequence.frames[*first].name
     );
-    let spoils = 20 * bad.len() > overlaps.len();
+    let spoils = 4 * bad.len() > overlaps.len();
     (overlaps.len() >= FEWEST && usual > FINE).then(|| Finding { spoils, ..Finding::new(Kind::FrameOffset, &sequence.id, detail) })
 }

@@ -22,6 +22,8 @@ const BETTER: f64 = 0.03;
 /// By how much in the mean, if nearly every frame says so; and as a share of what is missing to a perfect overlap.
 const SLIGHTLY: f64 = 0.01;
 const OF_THE_REST: f64 = 0.12;
+/// The same, where some frames or any pose may be chosen: poses of an estimator fit others a little better by chance.
+const OF_THE_REST_CHOSEN: f64 = 1.0 / 3.0;
 /// An overlap that leaves nothing to explain.
 const PERFECT: f64 = 0.95;
 /// Fewer frames decide nothing.
@@ -111,7 +113,7 @@ impl<'a> Neighbours<'a> {
         let own = mean(part.iter().map(|frame| frame.own))?;
         let gains: Vec<f64> = part.iter().filter_map(|frame| frame.gains.get(&shift).copied()).collect();
         let [first, .., last] = part else { return None };
-        if gains.len() < FEWEST || !consistent(&gains, own) {
+        if gains.len() < FEWEST || !consistent(&gains, own) || by_chance(average(&gains), own) {
             return None;
         }
         let gain = gains.iter().sum::<f64>() / self.frames.len() as f64;
@@ -136,7 +138,8 @@ impl<'a> Neighbours<'a> {
         }
         let gains: Vec<f64> = best.iter().map(|(_, (_, gain))| *gain).collect();
         let limit = outlying(&gains, 0.02);
-        let odd: Vec<_> = best.iter().filter(|(_, (_, gain))| *gain > limit).collect();
+        let odd: Vec<_> =
+            best.iter().filter(|(frame, (_, gain))| *gain > limit && !by_chance(*gain, frame.own)).collect();
         let (frame, (shift, gain)) = odd.first()?;
         let detail = format!(
             "{} of {} frames fit the pose of another ({} first, overlap {:.2} for {:.2}): {}",
@@ -180,7 +183,7 @@ impl<'a> Neighbours<'a> {
         let own = mean(matches.iter().map(|m| m.own))?;
         let gain = mean(matches.iter().map(|m| m.gain))?;
         // Poses that are merely wrong fit others by chance, and many of them the same one.
-        if n < FEWEST && !evident(gain, own) || gain < BETTER || 10 * moved.len() < 3 * n || 10 * distinct < 6 * moved.len() {
+        if n < FEWEST && !evident(gain, own) || gain < BETTER || by_chance(gain, own) || 10 * moved.len() < 3 * n || 10 * distinct < 6 * moved.len() {
             return None;
         }
         let away = |m: &&Match<'_>| m.pose as isize - self.bodies.pose_of(m.pair.0) as isize;
@@ -250,6 +253,11 @@ fn best_part<'f, 'a>(run: &'f [Frame<'a>], shift: isize) -> Option<&'f [Frame<'a
 
 fn average(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// True if so much may be gained from an overlap of `own` by the best of many poses, or for the best of many frames.
+fn by_chance(gain: f64, own: f64) -> bool {
+    gain < OF_THE_REST_CHOSEN * (1.0 - own)
 }
 
 /// True if so much better an overlap needs no further frames to be believed.
