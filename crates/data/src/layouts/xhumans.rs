@@ -138,7 +138,9 @@ impl Person<'_> {
         let first = images.values().next().cloned().unwrap_or_default();
         let [width, height] = image_size::of(&first)?;
         let rows = Rows::middle(width, height);
-        let cameras = cameras(&folder.join("render/cameras.npz"), images.len(), width, rows)?;
+        let cameras = cameras(&folder.join("render/cameras.npz"), images.len(), width, rows);
+        // An image that is not there leaves one camera too many.
+        let cameras = cameras.map_err(|error| depths.without_image(folder, &images).unwrap_or(error))?;
         let (mut tracks, mut frames) = (Vec::new(), Vec::new());
         for (i, (&number, image)) in images.iter().enumerate() {
             let depth = depths.of(number, format!("depth_{number:06}.tiff"))?;
@@ -207,6 +209,14 @@ impl Numbers {
     fn of(&self, number: usize, name: String) -> Result<PathBuf, Error> {
         let missing = || Error::invalid(&self.folder, self.field, format!("frame {number} is missing"), name);
         self.files.get(&number).cloned().ok_or_else(missing)
+    }
+
+    /// The first number that the images of a take lack.
+    fn without_image(&self, take: &Path, images: &BTreeMap<usize, PathBuf>) -> Option<Error> {
+        let number = self.files.keys().find(|number| !images.contains_key(number))?;
+        let expected = format!("color_{number:06}.png: {} has it", self.field);
+        let problem = format!("frame {number} is missing");
+        Some(Error::invalid(take.join("render/image"), "images", problem, expected))
     }
 }
 
