@@ -1,5 +1,5 @@
 //! `reproduce trade`: what it writes, what it refuses, and that only times differ from run to run.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "support/program.rs"]
 mod program;

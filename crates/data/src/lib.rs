@@ -22,7 +22,7 @@
 //! | [`folder`] | a subject as a folder of sequences |
 //! | [`layouts`] | data sets as others store them: NeuMan, PeopleSnapshot, GalaBasketball, X-Humans |
 //! | [`sequence`] | posed frames with their cameras, decoded when asked for |
-#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+#![cfg_attr(test, expect(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 pub mod arrays;
 pub mod atomic;

@@ -1,6 +1,6 @@
 //! Subjects in the layouts of other people, written by other people's libraries (tests/data/make/layouts.py): the same person
 //! through every layout, answers of NumPy where the person is made up, and what damaged folders say.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "layouts/bad_folders.rs"]
 mod bad_folders;
