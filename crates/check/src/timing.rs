@@ -277,7 +277,7 @@ fn consistent(gains: &[f64], own: f64) -> bool {
     if gain < SLIGHTLY.max(OF_THE_REST * (1.0 - own)) {
         return false;
     }
-    let variance = gains.iter().map(|g| (g - gain).powi(2)).sum::<f64>() / (n - 1) as f64;
+    let variance = gains.iter().map(|g| (g - gain) * (g - gain)).sum::<f64>() / (n - 1) as f64;
     let sure = n >= 6 && 10 * positive >= 8 * n && gain > 4.0 * (variance / n as f64).sqrt();
     sure || (gain > BETTER && 10 * positive >= 6 * n)
 }
