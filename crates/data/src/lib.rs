@@ -31,6 +31,7 @@ pub mod body;
 pub mod camera;
 mod capture;
 pub mod depth;
+pub mod entries;
 mod digest;
 pub mod error;
 pub mod folder;
