@@ -40,8 +40,10 @@ pub(super) const LAYOUT: Layout = Layout {
         Place::needed("registered images", "sparse/images.txt").telling(),
         Place::needed("masks", "4d_humans/sam_segmentations/*.png").telling(),
         Place::needed("masks", "segmentations/*.{npy,png}").telling(),
-        Place::needed("poses", "4d_humans/smpl_optimized_aligned_scale.npz").telling(),
-        Place::needed("poses", "smpl_output_optimized.pkl").telling(),
+        Place::needed("poses", "4d_humans/smpl_optimized_aligned_scale.npz")
+            .of_arrays(&["betas", "global_orient", "body_pose", "transl", "scale"])
+            .telling(),
+        Place::needed("poses", "smpl_output_optimized.pkl").of_arrays(&["pose", "betas"]).telling(),
         Place::optional("alignments", "alignments.npy").telling(),
     ],
     load,
@@ -59,15 +61,17 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let (train, test) = parts(request, captures.len())?;
     let poses_path = folder.join("4d_humans/smpl_optimized_aligned_scale.npz");
     let by_hugs = poses_path.is_file();
+    let of_poses = |e: Error| e.about("poses");
     let mut bodies = match by_hugs {
-        true => optimized(&poses_path, captures.len())?,
-        false => aligned::load(folder, &captures)?,
-    };
+        true => optimized(&poses_path, captures.len()),
+        false => aligned::load(folder, &captures),
+    }
+    .map_err(of_poses)?;
     bodies.track.betas = betas_of(&bodies, train.first().copied().unwrap_or_default(), &mut notes);
     let mut models = Models::new(folder, request.options);
     let body = models.of_person(&bodies.path, Family::Smpl, Gender::Neutral, &bodies.track)?;
     notes.extend_from_slice(models.notes());
-    let poses = bodies.poses(&body)?;
+    let poses = bodies.poses(&body).map_err(of_poses)?;
     let cameras: Vec<Camera> = captures.iter().map(|c| camera(c, by_hugs)).collect();
     notes.extend(camera_notes(&captures, by_hugs));
     if !by_hugs {
@@ -144,7 +148,7 @@ fn captures(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Registered>, E
     {
         let problem = format!("{} sorts before {}", pair[0].name, pair[1].name);
         let expected = "numbers of one width, as 00009.png and 00010.png";
-        return Err(Error::invalid(sparse.join("images.txt"), "names", problem, expected));
+        return Err(Error::invalid(sparse.join("images.txt"), "image names", problem, expected));
     }
     let images = folder.join("images");
     let present = listing::files(&images, "images", &["png", "jpg", "jpeg"])?;
