@@ -280,14 +280,22 @@ fn what_is_wrong_with_a_registry_is_named() {
             "dataset[0].avatars",
             "repeat",
         ),
-        (format!("{good}{}", split("y")), "dataset[0].splits.\"y\"", "no subject of this name; expected one of x"),
+        (
+            format!("{good}{}", split("y")),
+            "dataset[0].splits.\"y\"",
+            "no subject of this name; expected one of x",
+        ),
         (format!("{good}{people}{}", split("ana")), "dataset[0].splits.\"ana\"", "is `anna` meant?"),
         (
             format!("{good}{people}{}b = {{ train = [0, 1, 1], test = [2, 3, 1] }}\n", split("bob")),
             "dataset[0].splits.\"bob\"",
             "the subject of splits.\"b\" again",
         ),
-        (format!("{good}subjects = [\"anna\"]\n[dataset.folders]\nana = \"a\"\n"), "dataset[0].folders.\"ana\"", "`anna`"),
+        (
+            format!("{good}subjects = [\"anna\"]\n[dataset.folders]\nana = \"a\"\n"),
+            "dataset[0].folders.\"ana\"",
+            "`anna`",
+        ),
         ("[[dataset]".into(), "line 1", ""),
     ];
     for (text, field, word) in cases {

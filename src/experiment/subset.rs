@@ -28,8 +28,8 @@ pub(super) fn subjects_are_of_a_table(
 /// Refuses subjects of whom one cannot be loaded, where that leaves nothing to do: the first such reason.
 pub(super) fn subjects_can_be_loaded(datasets: &[Dataset], options: &Options) -> Result<(), Error> {
     let asked = &options.subset.subjects;
-    let unreadable = datasets.iter().flat_map(|dataset| &dataset.unreadable);
-    match unreadable.into_iter().find(|own| asked.contains(&own.subject)) {
+    let mut unreadable = datasets.iter().flat_map(|dataset| &dataset.unreadable);
+    match unreadable.find(|own| asked.contains(&own.subject)) {
         None => Ok(()),
         Some(broken) => {
             let problem = format!("`{}` cannot be loaded: {}", broken.subject, broken.problem);

@@ -101,10 +101,7 @@ pub(super) fn describe(path: &Path, subject: &str, sequence: &Sequence) -> Resul
 }
 
 /// The images that no frame was paired with.
-fn left_over(
-    images: &BTreeMap<String, PathBuf>,
-    paired: &BTreeMap<String, PathBuf>,
-) -> Option<LeftOver> {
+fn left_over(images: &BTreeMap<String, PathBuf>, paired: &BTreeMap<String, PathBuf>) -> Option<LeftOver> {
     let used: BTreeSet<&PathBuf> = paired.values().collect();
     let mut others = images.iter().filter(|(_, file)| !used.contains(file)).map(|(name, _)| name);
     let first = others.next()?.clone();

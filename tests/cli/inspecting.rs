@@ -137,7 +137,10 @@ fn files_of_arrays_say_who_reads_them() {
         &["HDF5", "pose ", "betas ", "layout peoplesnapshot-raw: poses"],
     );
     has(&inspect("neuman/own/alignments.npy"), &["00000.png", "[4, 3]", "layout neuman: alignments"]);
-    has(&inspect("neuman/own/smpl_output_optimized.pkl"), &[".pose", ".betas", "72]", "layout neuman: poses"]);
+    has(
+        &inspect("neuman/own/smpl_output_optimized.pkl"),
+        &[".pose", ".betas", "72]", "layout neuman: poses"],
+    );
     has(
         &inspect("xhumans/00099/train/Take4/render/cameras.npz"),
         &["npz archive", "extrinsic", "[5, 4, 4]", "layout xhumans: training cameras"],

@@ -97,14 +97,25 @@ fn images_of_no_frame_are_named() {
     let desk = desk();
     let run = |desk: &Desk| {
         desk.run(args![
-            "run", "small.toml", "--data", data("small"), "--fit-iterations", "2", "--out", "run", "--renders",
-            "surface=theirs/tiny", "--variant", "surface"
+            "run",
+            "small.toml",
+            "--data",
+            data("small"),
+            "--fit-iterations",
+            "2",
+            "--out",
+            "run",
+            "--renders",
+            "surface=theirs/tiny",
+            "--variant",
+            "surface"
         ])
     };
     let answer = run(&desk).exits(0, "every image is of a frame");
     assert!(!answer.err.contains("no frame"), "{answer:?}");
     for name in ["image_9998.png", "image_9999.png"] {
-        std::fs::copy(desk.path("theirs/tiny/image_0001.png"), desk.path(&format!("theirs/tiny/{name}"))).unwrap();
+        std::fs::copy(desk.path("theirs/tiny/image_0001.png"), desk.path(&format!("theirs/tiny/{name}")))
+            .unwrap();
     }
     let answer = run(&desk).exits(0, "two are of none");
     let said = "2 more images are of no frame, such as image_9998";
@@ -189,7 +200,17 @@ fn half_a_data_set_gives_half_a_table() {
     // Asked for by name it costs its row too, and ends the run where nothing else was asked for.
     let asked = |subjects: &[&str], out: &str| {
         desk.put("datasets.toml", registry("[\"tiny\", \"torn\"]"));
-        let mut all = args!["-q", "run", "pair.toml", "--datasets", "datasets.toml", "--variant", "surface", "--out", out];
+        let mut all = args![
+            "-q",
+            "run",
+            "pair.toml",
+            "--datasets",
+            "datasets.toml",
+            "--variant",
+            "surface",
+            "--out",
+            out
+        ];
         all.extend(subjects.iter().flat_map(|id| ["--subject", *id]).map(OsString::from));
         desk.run(all)
     };

@@ -35,7 +35,8 @@ mod tests {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
         let weights = SkinWeights::from_rows(vec![vec![(0, 1.0)]; 4], 1).unwrap();
         RestBody {
-            skeleton: Skeleton::from_joint_positions(vec!["root".into()], vec![None], &[DVec3::ZERO]).unwrap(),
+            skeleton: Skeleton::from_joint_positions(vec!["root".into()], vec![None], &[DVec3::ZERO])
+                .unwrap(),
             vertices: corners.map(|corner| corner * scale).into(),
             faces: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
             weights,

@@ -18,9 +18,9 @@ pub(super) fn cut_short(file: impl Read, length: u64) -> Option<String> {
     }
     let rest = start.strip_prefix(SIGNATURE)?;
     match declared_end(rest) {
-        Declared::End(end) if length < end => {
-            Some(format!("the file ends early, after {length} of the {end} bytes that its superblock declares"))
-        }
+        Declared::End(end) if length < end => Some(format!(
+            "the file ends early, after {length} of the {end} bytes that its superblock declares"
+        )),
         Declared::CutOff => Some(format!("the file ends early, within its superblock, after {length} bytes")),
         Declared::End(_) | Declared::Unknown => None,
     }

@@ -68,7 +68,8 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let folder = request.folder;
     let rig = Rig::load(&folder.join("model")).map_err(|e| e.about("body model"))?;
     let (times, poses) = poses(&folder.join("pose"), &rig).map_err(|e| e.about("poses"))?;
-    let cameras: Sourced<Vec<Camera>> = cameras(&folder.join("camera")).map_err(|e| e.about("camera"))?.into();
+    let cameras: Sourced<Vec<Camera>> =
+        cameras(&folder.join("camera")).map_err(|e| e.about("camera"))?.into();
     let images = TRAIN_CAMERAS
         .iter()
         .chain(&TEST_CAMERAS)

@@ -75,9 +75,8 @@ const PARTS: [(&str, Part, usize); 7] = [
 const CAMERA_ARRAYS: [&str; 2] = ["intrinsic", "extrinsic"];
 
 /// What is read of a frame's pose: [`PARTS`] and where the body stands. Betas are the subject's.
-const POSE_ARRAYS: [&str; 9] = [
-    PARTS[0].0, PARTS[1].0, PARTS[2].0, PARTS[3].0, PARTS[4].0, PARTS[5].0, PARTS[6].0, "transl", "trans",
-];
+const POSE_ARRAYS: [&str; 9] =
+    [PARTS[0].0, PARTS[1].0, PARTS[2].0, PARTS[3].0, PARTS[4].0, PARTS[5].0, PARTS[6].0, "transl", "trans"];
 
 /// Loads every take of a subject.
 ///

@@ -381,11 +381,7 @@ fn the_other_layouts_name_what_does_not_match() {
                 "a mirrored joint",
                 |f| {
                     let row = "0.871354992,0.0242893001,0.490051536";
-                    replace(
-                        f.join("model/tpose_mat.txt"),
-                        row,
-                        "-0.871354992,-0.0242893001,-0.490051536",
-                    );
+                    replace(f.join("model/tpose_mat.txt"), row, "-0.871354992,-0.0242893001,-0.490051536");
                 },
                 "body model matrices[0]",
                 "determinant -1.000",
