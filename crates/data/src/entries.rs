@@ -83,8 +83,12 @@ fn collect(field: &Field<'_>, depth: usize, found: &mut Vec<Entry>) {
         return;
     }
     let (what, reach) = match field.array() {
-        Ok(array) if array.shape.is_empty() => (field.describe(), Reach::of(array.values)),
-        Ok(array) => (format!("{}, {:?}", field.describe(), array.shape), Reach::of(array.values)),
+        Ok(array) if array.shape.is_empty() => (array.values[0].to_string(), None),
+        Ok(array) => {
+            let (what, shape) = (field.describe(), format!("{:?}", array.shape));
+            let what = if what.contains(&shape) { what } else { format!("{what}, {shape}") };
+            (what, Reach::of(array.values))
+        }
         Err(_) => (field.text().map_or_else(|_| field.describe(), |text| format!("{text:?}")), None),
     };
     let name = if field.name().is_empty() { "the whole file" } else { field.name() };

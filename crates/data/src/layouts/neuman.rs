@@ -203,7 +203,14 @@ fn masks(folder: &Path, captures: &[Registered], notes: &mut Vec<String>) -> Res
 /// HUGS's poses.
 fn optimized(path: &Path, frames: usize) -> Result<Bodies, Error> {
     let mut archive = Archive::open(path, "poses")?;
-    let betas = archive.require("betas", "*,*")?;
+    let betas = match archive.header("betas")?.shape.len() {
+        1 => archive.require("betas", "*")?,
+        _ => archive.require("betas", "*,*")?,
+    };
+    let (rows, width) = match betas.shape[..] {
+        [rows, width] => (rows, width),
+        _ => (1, betas.values.len()),
+    };
     let orient = archive.require("global_orient", "N,3")?;
     if orient.shape[0] != frames {
         let problem = format!("{} poses", orient.shape[0]);
@@ -217,14 +224,13 @@ fn optimized(path: &Path, frames: usize) -> Result<Bodies, Error> {
     let translations = triples(&archive.require("transl", "N,3")?.values);
     let pattern = if archive.header("scale")?.shape.len() == 2 { "N,1" } else { "N" };
     let scale = archive.require("scale", pattern)?;
-    let count = betas.shape[1].max(1);
-    if ![1, frames].contains(&betas.shape[0]) {
-        return Err(archive.invalid("betas", format!("{} rows", betas.shape[0]), format!("1 or {frames}")));
+    if ![1, frames].contains(&rows) {
+        return Err(archive.invalid("betas", format!("{rows} rows"), format!("1 or {frames}")));
     }
     let parts = vec![(Part::GlobalOrient, orient.values), (Part::BodyPose, body_pose.values)];
     Ok(Bodies {
         path: path.to_owned(),
-        betas: betas.values.chunks_exact(count).map(<[f64]>::to_vec).collect(),
+        betas: betas.values.chunks_exact(width.max(1)).map(<[f64]>::to_vec).collect(),
         track: PoseTrack::from_parts(path, Vec::new(), parts, translations)?.with_scales(&scale.values)?,
         places: None,
     })

@@ -241,7 +241,8 @@ fn track(path: &Path, count: usize) -> Result<PoseTrack, Error> {
             return Err(Error::invalid(path, field, format!("{found} rows"), expected));
         }
     }
-    let betas = file.array("betas", &[0])?.values;
+    let is_row = file.rows("betas")?.shape().len() == 2;
+    let betas = file.array("betas", if is_row { &[1, 0] } else { &[0] })?.values;
     let parts = vec![(Part::Whole, pose.values)];
     PoseTrack::from_parts(path, betas, parts, triples(&trans.values))
 }
@@ -256,7 +257,8 @@ fn clothed(
 ) -> Result<Arc<RestBody>, Error> {
     let of_body = |e: Error| e.about("body model");
     let pickle = Pickle::read(path, "consensus").map_err(of_body)?;
-    let own = pickle.get("betas")?.numbers("*")?.values;
+    let own = pickle.get("betas")?;
+    let own = own.numbers("1,*").or_else(|_| own.numbers("*"))?.values;
     let far = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-5;
     if own.len() != track.betas.len() || own.iter().zip(&track.betas).any(far) {
         notes.push(

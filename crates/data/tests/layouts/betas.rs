@@ -12,9 +12,12 @@ use std::path::Path;
 type Rewrite = fn(&Path, &[f64]);
 
 /// The layout, its folder, its body model, how betas are rewritten.
-const LAYOUTS: [(&str, &str, &str, Rewrite); 5] = [
+const LAYOUTS: [(&str, &str, &str, Rewrite); 7] = [
     ("neuman", "neuman/ava", "anny_smpl24.npz", |folder, betas| {
         archived(&folder.join("4d_humans/smpl_optimized_aligned_scale.npz"), betas, Rows::Eight)
+    }),
+    ("neuman", "neuman/ava", "anny_smpl24.npz", |folder, betas| {
+        archived(&folder.join("4d_humans/smpl_optimized_aligned_scale.npz"), betas, Rows::None)
     }),
     ("peoplesnapshot", "peoplesnapshot/ava", "anny_smpl24.npz", |folder, betas| {
         std::fs::remove_dir_all(folder.join("poses")).unwrap();
@@ -25,7 +28,10 @@ const LAYOUTS: [(&str, &str, &str, Rewrite); 5] = [
         archived(&folder.join("poses.npz"), betas, Rows::One)
     }),
     ("peoplesnapshot-raw", "peoplesnapshot-raw/ava", "anny_smpl24.npz", |folder, betas| {
-        stored(&folder.join("reconstructed_poses.hdf5"), betas)
+        stored(&folder.join("reconstructed_poses.hdf5"), betas, Rows::None)
+    }),
+    ("peoplesnapshot-raw", "peoplesnapshot-raw/ava", "anny_smpl24.npz", |folder, betas| {
+        stored(&folder.join("reconstructed_poses.hdf5"), betas, Rows::One)
     }),
     ("xhumans", "xhumans/00099", "anny_smplx55.npz", |folder, betas| {
         let bytes = npy(&[betas.len() as u64], betas);
@@ -41,18 +47,24 @@ enum Rows {
     Eight,
 }
 
+impl Rows {
+    /// The shape of an array with so many betas, and how often it holds them.
+    fn of(self, width: u64) -> (Vec<u64>, usize) {
+        match self {
+            Self::None => (vec![width], 1),
+            Self::One => (vec![1, width], 1),
+            Self::Eight => (vec![8, width], 8),
+        }
+    }
+}
+
 fn archived(path: &Path, betas: &[f64], rows: Rows) {
     let mut archive = Archive::open(path, "poses").unwrap();
     let others: Vec<String> = archive.names().into_iter().filter(|name| name != "betas").collect();
     let arrays: Vec<_> = others.iter().map(|name| (name, archive.array(name).unwrap().unwrap())).collect();
     let shapes: Vec<Vec<u64>> =
         arrays.iter().map(|(_, array)| array.shape.iter().map(|&n| n as u64).collect()).collect();
-    let width = betas.len() as u64;
-    let (shape, count) = match rows {
-        Rows::None => (vec![width], 1),
-        Rows::One => (vec![1, width], 1),
-        Rows::Eight => (vec![8, width], 8),
-    };
+    let (shape, count) = rows.of(betas.len() as u64);
     let mut fields = vec![("betas", &shape[..], Values::F64(betas.repeat(count)))];
     for ((name, array), shape) in arrays.iter().zip(&shapes) {
         fields.push((name.as_str(), &shape[..], Values::F64(array.values.clone())));
@@ -60,7 +72,7 @@ fn archived(path: &Path, betas: &[f64], rows: Rows) {
     npz(path, &fields);
 }
 
-fn stored(path: &Path, betas: &[f64]) {
+fn stored(path: &Path, betas: &[f64], rows: Rows) {
     let file = Hdf5::open(path, "poses").unwrap();
     let mut builder = hdf5_pure::FileBuilder::new();
     for (name, shape) in [("pose", [0, 72]), ("trans", [0, 3])] {
@@ -68,7 +80,7 @@ fn stored(path: &Path, betas: &[f64]) {
         let shape: Vec<u64> = array.shape.iter().map(|&n| n as u64).collect();
         builder.create_dataset(name).with_f64_data(&array.values).with_shape(&shape);
     }
-    builder.create_dataset("betas").with_f64_data(betas).with_shape(&[betas.len() as u64]);
+    builder.create_dataset("betas").with_f64_data(betas).with_shape(&rows.of(betas.len() as u64).0);
     drop(file);
     builder.write(path).unwrap();
 }
