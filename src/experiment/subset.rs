@@ -32,8 +32,11 @@ pub(super) fn subjects_can_be_loaded(datasets: &[Dataset], options: &Options) ->
     match unreadable.find(|own| asked.contains(&own.subject)) {
         None => Ok(()),
         Some(broken) => {
-            let problem = format!("`{}` cannot be loaded: {}", broken.subject, broken.problem);
-            Err(Error::invalid("subset", "subjects", problem, "a subject that can be loaded"))
+            // The reason says itself what was expected.
+            let (why, expected) = (broken.problem.rsplit_once("; expected "))
+                .unwrap_or((&broken.problem, "a subject that can be loaded"));
+            let problem = format!("`{}` cannot be loaded: {why}", broken.subject);
+            Err(Error::invalid("subset", "subjects", problem, expected))
         }
     }
 }
