@@ -52,11 +52,10 @@ fn layouts() -> PathBuf {
 
 fn of_ava(layout: &str, folder: &str) -> Vec<f64> {
     let model = data("blender/models/anny_smpl24.npz");
-    let more = format!(
-        "model = {model:?}\n[dataset.splits]\nava = {{ train = [0, 5, 1], test = [6, 7, 1] }}\n\
-         own = {{ train = [0, 5, 1], test = [6, 7, 1] }}\n"
-    );
     let (parent, subject) = folder.rsplit_once('/').unwrap();
+    let more = format!(
+        "model = {model:?}\n[dataset.splits]\n{subject} = {{ train = [0, 5, 1], test = [6, 7, 1] }}\n"
+    );
     scores(
         layout,
         &registry(layout, "monocular", layouts().join(parent), subject, &more),

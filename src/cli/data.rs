@@ -148,7 +148,8 @@ impl Data {
         let avatars = avatars.map(|a| RegisteredAvatar { name: a.name.clone(), path: a.path.clone() });
         let id = asking.map_or_else(|| dataset.id.clone(), Experiment::data_id);
         let title = dataset.title.clone();
-        let splits_given = dataset.subject_ids()?.into_iter().filter(|id| dataset.has_split(id)).collect();
+        let splits_given =
+            dataset.subject_ids()?.into_iter().filter(|id| dataset.split_of(id).is_some()).collect();
         Ok(LoadedDataset { id, title, subjects, avatars: avatars.collect(), splits_given, unreadable })
     }
 

@@ -186,11 +186,11 @@ impl Files {
     }
 
     fn cameras(&self) -> Result<Vec<Camera>, Error> {
-        camera::load(&self.or_listing("cameras.npz"))
+        camera::load(&self.or_listing("cameras.npz")).map_err(|e| e.about("camera"))
     }
 
     fn poses(&self) -> Result<PoseTrack, Error> {
-        poses::load(&self.or_listing("poses.npz"))
+        poses::load(&self.or_listing("poses.npz")).map_err(|e| e.about("poses"))
     }
 
     fn or_listing(&self, name: &str) -> PathBuf {
@@ -207,7 +207,7 @@ fn load_sequence(folder: &Path, id: &str, models: &mut Models) -> Result<Sequenc
     let cameras = files.cameras()?;
     let track = files.poses()?;
     let body = models.of_track(&files.or_listing("poses.npz"), transforms.model.as_deref(), &track)?;
-    let poses = track.poses(&body.skeleton)?;
+    let poses = track.poses(&body.skeleton).map_err(|e| e.about("poses"))?;
     let frames = frames_of(&files, transforms.frames, poses.len(), cameras.len())?;
     Ok(Sequence { id: id.to_owned(), body, poses, cameras: cameras.into(), frames, stored_sizes: None })
 }

@@ -32,6 +32,7 @@ pub mod camera;
 mod capture;
 pub mod depth;
 mod digest;
+pub mod entries;
 pub mod error;
 pub mod folder;
 pub mod frames;

@@ -213,7 +213,7 @@ impl<'a> Models<'a> {
                 None => "models/ of the subject's folder or of one of the two above it".to_owned(),
             };
             let problem = format!("no {} body", gender.name());
-            Error::invalid(source, "model", problem, format!("{}.npz or .pkl in {place}", stems[0]))
+            Error::invalid(source, "body model", problem, format!("{}.npz or .pkl in {place}", stems[0]))
         })
     }
 
@@ -225,7 +225,7 @@ impl<'a> Models<'a> {
         expression: &[f64],
     ) -> Result<Arc<RestBody>, Error> {
         if !self.loaded.contains_key(path) {
-            let body::Loaded { body, notes } = body::read(path)?;
+            let body::Loaded { body, notes } = body::read(path).map_err(|e| e.about("body model"))?;
             notes.iter().for_each(|note| self.note(path, note));
             self.loaded.insert(path.to_owned(), Model { body, shapes: Vec::new() });
         }
@@ -234,22 +234,24 @@ impl<'a> Models<'a> {
         if let Some((_, rest)) = shapes.iter().find(|(known, _)| *known == coefficients) {
             return Ok(rest.clone());
         }
+        let directions = body.shape.as_ref().map_or(0, |own| own.directions.len());
         let fit = ShapeFit {
             file: source.to_owned(),
             betas: betas.iter().rposition(|&beta| beta != 0.0).map_or(0, |last| last + 1),
-            directions: body.shape.as_ref().map_or(0, |own| own.directions.len()),
+            directions,
         };
         let (mut rest, notes) = body::shape(body, betas, expression).map_err(|e| Error::scene(source, e))?;
         let offsets = self.subject.join("gt_normal_offset.npy");
         if self.options.clothing && offsets.is_file() {
-            let array = npy::read(&offsets)?;
+            let of_body = |e: Error| e.about("body model");
+            let array = npy::read(&offsets).map_err(of_body)?;
             if let Some(i) = array.values.iter().position(|v| v.is_nan() || v.abs() > THICKEST) {
                 let problem = format!("{:e}", array.values[i]);
                 let expected = format!("metres of clothing, at most {THICKEST}");
-                return Err(Error::invalid(&offsets, format!("value {i}"), problem, expected));
+                return Err(Error::invalid(&offsets, format!("body model offsets[{i}]"), problem, expected));
             }
             let values: Vec<f32> = array.values.iter().map(|&v| v as f32).collect();
-            rest = rest.with_normal_offset(&values).map_err(|e| Error::scene(&offsets, e))?;
+            rest = rest.with_normal_offset(&values).map_err(|e| of_body(Error::scene(&offsets, e)))?;
         }
         let rest = Arc::new(rest);
         shapes.push((coefficients, rest.clone()));
@@ -257,6 +259,9 @@ impl<'a> Models<'a> {
             self.shapes.push(fit);
         }
         notes.iter().for_each(|note| self.note(source, note));
+        if betas.is_empty() && directions > 0 {
+            self.note(source, &format!("no betas, for a model of {directions} directions: the mean shape"));
+        }
         Ok(rest)
     }
 
@@ -268,13 +273,13 @@ impl<'a> Models<'a> {
             (None, _) => {}
         }
         let Some(name) = name else {
-            return Err(Error::invalid(source, "model", "missing", "a body model, named here or given"));
+            return Err(Error::invalid(source, "body model", "missing", "a body model, named here or given"));
         };
         let found = || self.places().iter().map(|place| place.join(name)).find(|path| path.is_file());
         let inside = super::listing::stays_inside(name, 0);
         inside.then(found).flatten().ok_or_else(|| {
             let expected = "a file in models/ of the subject's folder or of one of the two above it";
-            Error::invalid(source, "model", format!("{name} not found"), expected)
+            Error::invalid(source, "body model", format!("{name} not found"), expected)
         })
     }
 
@@ -326,7 +331,7 @@ mod tests {
         assert!(found.ends_with("SMPL_MALE.npz"), "{}", found.display());
         let error = models.path_of(&subject, Family::Smpl, Gender::Female).unwrap_err().to_string();
         assert!(
-            error.contains("model: no female body; expected SMPL_FEMALE.npz or .pkl in models/"),
+            error.contains("body model: no female body; expected SMPL_FEMALE.npz or .pkl in models/"),
             "{error}"
         );
     }

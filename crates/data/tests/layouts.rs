@@ -4,12 +4,16 @@
 
 #[path = "layouts/bad_folders.rs"]
 mod bad_folders;
+#[path = "layouts/betas.rs"]
+mod betas;
 #[path = "layouts/made_up.rs"]
 mod made_up;
 #[path = "layouts/names.rs"]
 mod names;
 #[path = "../../../tests/support/mod.rs"]
 mod support;
+#[path = "../../../tests/support/files.rs"]
+mod support_files;
 
 use skinsplat_core::scene::PosedBody;
 use skinsplat_data::folder::Options;

@@ -35,7 +35,7 @@ const MODELS: [(&str, usize, usize); 5] = [
 /// # Errors
 /// Missing or malformed files, camera models that are not read, images of unknown cameras, two images of one name.
 pub(super) fn load(folder: &Path) -> Result<Vec<Registered>, Error> {
-    let cameras = cameras(&folder.join("cameras.txt"))?;
+    let cameras = cameras(&folder.join("cameras.txt")).map_err(|e| e.about("camera"))?;
     let path = folder.join("images.txt");
     let text = text(&path, "images")?;
     let mut images = Vec::new();
@@ -44,7 +44,7 @@ pub(super) fn load(folder: &Path) -> Result<Vec<Registered>, Error> {
         if line.trim().is_empty() {
             continue;
         }
-        images.push(image(&path, number + 1, line, &cameras)?);
+        images.push(image(&path, number + 1, line, &cameras).map_err(|e| e.about("image"))?);
         // The points of the image, unless a tool has dropped the empty line of an image without any.
         lines.next_if(|(_, line)| !is_image(line));
     }

@@ -40,8 +40,10 @@ pub(super) const LAYOUT: Layout = Layout {
         Place::needed("registered images", "sparse/images.txt").telling(),
         Place::needed("masks", "4d_humans/sam_segmentations/*.png").telling(),
         Place::needed("masks", "segmentations/*.{npy,png}").telling(),
-        Place::needed("poses", "4d_humans/smpl_optimized_aligned_scale.npz").telling(),
-        Place::needed("poses", "smpl_output_optimized.pkl").telling(),
+        Place::needed("poses", "4d_humans/smpl_optimized_aligned_scale.npz")
+            .of_arrays(&["betas", "global_orient", "body_pose", "transl", "scale"])
+            .telling(),
+        Place::needed("poses", "smpl_output_optimized.pkl").of_arrays(&["pose", "betas"]).telling(),
         Place::optional("alignments", "alignments.npy").telling(),
     ],
     load,
@@ -59,15 +61,17 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let (train, test) = parts(request, captures.len())?;
     let poses_path = folder.join("4d_humans/smpl_optimized_aligned_scale.npz");
     let by_hugs = poses_path.is_file();
+    let of_poses = |e: Error| e.about("poses");
     let mut bodies = match by_hugs {
-        true => optimized(&poses_path, captures.len())?,
-        false => aligned::load(folder, &captures)?,
-    };
+        true => optimized(&poses_path, captures.len()),
+        false => aligned::load(folder, &captures),
+    }
+    .map_err(of_poses)?;
     bodies.track.betas = betas_of(&bodies, train.first().copied().unwrap_or_default(), &mut notes);
     let mut models = Models::new(folder, request.options);
     let body = models.of_person(&bodies.path, Family::Smpl, Gender::Neutral, &bodies.track)?;
     notes.extend_from_slice(models.notes());
-    let poses = bodies.poses(&body)?;
+    let poses = bodies.poses(&body).map_err(of_poses)?;
     let cameras: Vec<Camera> = captures.iter().map(|c| camera(c, by_hugs)).collect();
     notes.extend(camera_notes(&captures, by_hugs));
     if !by_hugs {
@@ -144,7 +148,7 @@ fn captures(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Registered>, E
     {
         let problem = format!("{} sorts before {}", pair[0].name, pair[1].name);
         let expected = "numbers of one width, as 00009.png and 00010.png";
-        return Err(Error::invalid(sparse.join("images.txt"), "names", problem, expected));
+        return Err(Error::invalid(sparse.join("images.txt"), "image names", problem, expected));
     }
     let images = folder.join("images");
     let present = listing::files(&images, "images", &["png", "jpg", "jpeg"])?;
@@ -199,7 +203,14 @@ fn masks(folder: &Path, captures: &[Registered], notes: &mut Vec<String>) -> Res
 /// HUGS's poses.
 fn optimized(path: &Path, frames: usize) -> Result<Bodies, Error> {
     let mut archive = Archive::open(path, "poses")?;
-    let betas = archive.require("betas", "*,*")?;
+    let betas = match archive.header("betas")?.shape.len() {
+        1 => archive.require("betas", "*")?,
+        _ => archive.require("betas", "*,*")?,
+    };
+    let (rows, width) = match betas.shape[..] {
+        [rows, width] => (rows, width),
+        _ => (1, betas.values.len()),
+    };
     let orient = archive.require("global_orient", "N,3")?;
     if orient.shape[0] != frames {
         let problem = format!("{} poses", orient.shape[0]);
@@ -213,14 +224,13 @@ fn optimized(path: &Path, frames: usize) -> Result<Bodies, Error> {
     let translations = triples(&archive.require("transl", "N,3")?.values);
     let pattern = if archive.header("scale")?.shape.len() == 2 { "N,1" } else { "N" };
     let scale = archive.require("scale", pattern)?;
-    let count = betas.shape[1].max(1);
-    if ![1, frames].contains(&betas.shape[0]) {
-        return Err(archive.invalid("betas", format!("{} rows", betas.shape[0]), format!("1 or {frames}")));
+    if ![1, frames].contains(&rows) {
+        return Err(archive.invalid("betas", format!("{rows} rows"), format!("1 or {frames}")));
     }
     let parts = vec![(Part::GlobalOrient, orient.values), (Part::BodyPose, body_pose.values)];
     Ok(Bodies {
         path: path.to_owned(),
-        betas: betas.values.chunks_exact(count).map(<[f64]>::to_vec).collect(),
+        betas: betas.values.chunks_exact(width.max(1)).map(<[f64]>::to_vec).collect(),
         track: PoseTrack::from_parts(path, Vec::new(), parts, translations)?.with_scales(&scale.values)?,
         places: None,
     })
