@@ -207,6 +207,7 @@ fn subject(body: &RestBody) -> Subject {
         train: Vec::new(),
         test: vec![sequence],
         notes: Vec::new(),
+        doubts: Vec::new(),
         shapes: Vec::new(),
     }
 }

@@ -93,6 +93,7 @@ impl Dataset {
                 train,
                 test,
                 notes: Vec::new(),
+                doubts: Vec::new(),
                 shapes: Vec::new(),
             });
         }

@@ -138,7 +138,10 @@ fn describe_subject(
 /// What a reader of numbers has to know of a subject: what its files say or lack, and what a quick look finds.
 pub fn subject_notes(subject: &Subject) -> Vec<String> {
     let mut notes = subject.notes.clone();
-    notes.extend(skinsplat_check::subject(subject).iter().map(|found| format!("check finds {}", found.kind)));
+    // Some findings are notes already.
+    let own =
+        skinsplat_check::subject(subject).into_iter().filter(|found| !subject.notes.contains(&found.detail));
+    notes.extend(own.map(|found| format!("check finds {}", found.kind)));
     notes.extend(subject.sequences().flat_map(misfits));
     each_once(notes)
 }

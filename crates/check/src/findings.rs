@@ -28,8 +28,7 @@ pub(super) fn of(sequence: &Sequence, small: &Sequence, seen: &[Seen]) -> Vec<Fi
     listed(Kind::BodyOutOfView, &|shadows| shadows.body.area == 0, "the camera does not see the body");
     found.extend(masks::dim(sequence, seen));
     found.extend(far_principal_point(sequence, &usable));
-    let telling =
-        |s: &Shadows| s.mask.area > 0 && s.body.area > 0 && !masks::is_full(s);
+    let telling = |s: &Shadows| s.mask.area > 0 && s.body.area > 0 && !masks::is_full(s);
     let both = usable.into_iter().filter(|(_, shadows)| telling(shadows)).collect();
     let (both, inverted) = masks::inverted(sequence, both);
     found.extend(inverted);

@@ -34,6 +34,7 @@ pub fn of_another_gender([own, other]: [&Sequence; 2], gender: &str, frames: &[u
     if pairs.len() < FEWEST || 5 * better < 4 * pairs.len() || other_fit < own_fit + BETTER {
         return None;
     }
-    let detail = format!("masks fit the {gender} body better than this one: overlap {other_fit:.3} for {own_fit:.3}");
+    let detail =
+        format!("masks fit the {gender} body better than this one: overlap {other_fit:.3} for {own_fit:.3}");
     Some(Finding::new(Kind::WrongGenderOrModel, &own.id, detail))
 }

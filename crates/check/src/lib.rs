@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use shadows::Shadow;
 use skinsplat_core::scene::{Camera, Mask, PosedBody};
-use skinsplat_data::{Error, Sequence, ShapeFit, Subject};
+use skinsplat_data::{Doubt, Doubtful, Error, Sequence, ShapeFit, Subject};
 use skinsplat_render::mesh::{Mesh, SamplePattern, silhouette};
 
 /// Longer side at which silhouettes are compared, pixels.
@@ -86,7 +86,8 @@ impl Finding {
     /// The finding behind a subject that cannot be loaded: no number can be made from it. Told by the field that the error is about, else
     /// by the file; what is not there, or is about nothing in particular, is missing.
     pub fn of_error(error: &Error) -> Self {
-        let named = |name: Option<&std::ffi::OsStr>| name.map_or(String::new(), |name| name.to_string_lossy().into());
+        let named =
+            |name: Option<&std::ffi::OsStr>| name.map_or(String::new(), |name| name.to_string_lossy().into());
         let places = [error.field().to_owned(), named(error.path().file_name())];
         let folder = named(error.path().parent().and_then(|folder| folder.file_name()));
         let kind = places.iter().chain([&folder]).find_map(|name| kind_of(&name.to_lowercase()));
@@ -101,16 +102,40 @@ fn kind_of(name: &str) -> Option<Kind> {
         (Kind::Camera, &["camera", "intrinsic", "extrinsic", "w2c", "focal"]),
         (
             Kind::PoseCount,
-            &["pose", "theta", "global_orient", "trans", "smpl_o", "alignments", "scale", "expression", "mesh-f"],
+            &[
+                "pose",
+                "theta",
+                "global_orient",
+                "trans",
+                "smpl_o",
+                "alignments",
+                "scale",
+                "expression",
+                "mesh-f",
+            ],
         ),
         (Kind::MissingFrames, &["image", "mask", "frame", "depth", "background", "video"]),
         (
             Kind::WrongGenderOrModel,
-            &["gender", "model", "body", "weights", "v_template", "v_personal", "consensus", "regressor", "rig", "smpl_", "smplx_"],
+            &[
+                "gender",
+                "model",
+                "body",
+                "weights",
+                "v_template",
+                "v_personal",
+                "consensus",
+                "regressor",
+                "rig",
+                "smpl_",
+                "smplx_",
+            ],
         ),
     ];
     // X-Humans has its poses in a folder of this name.
-    let told = || WORDS.iter().find(|(_, words)| words.iter().any(|word| name.contains(word))).map(|(kind, _)| *kind);
+    let told = || {
+        WORDS.iter().find(|(_, words)| words.iter().any(|word| name.contains(word))).map(|(kind, _)| *kind)
+    };
     if name == "smplx" { Some(Kind::PoseCount) } else { told() }
 }
 
@@ -157,9 +182,16 @@ struct Problem {
     text: String,
 }
 
-/// What a subject's own numbers say, before any frame is looked at: shapes that its body model cannot take. `sequence` of the
-/// findings is empty.
+/// What a subject's own files say, before any frame is looked at: shapes that its body model cannot take, lenses that distort, a body of
+/// another gender. `sequence` of the findings is empty.
 pub fn subject(subject: &Subject) -> Vec<Finding> {
+    let of_doubt = |Doubt { about, note }: &Doubt| {
+        let kind = match about {
+            Doubtful::Lens => Kind::Camera,
+            Doubtful::Gender => Kind::WrongGenderOrModel,
+        };
+        Finding { spoils: false, ..Finding::new(kind, "", note.clone()) }
+    };
     let cut = subject.shapes.iter().filter(|shape| shape.betas > shape.directions);
     let finding = |shape: &ShapeFit| {
         let ShapeFit { file, betas, directions } = shape;
@@ -169,7 +201,7 @@ pub fn subject(subject: &Subject) -> Vec<Finding> {
         );
         Finding::new(Kind::BetasSize, "", detail)
     };
-    cut.map(finding).collect()
+    cut.map(finding).chain(subject.doubts.iter().map(of_doubt)).collect()
 }
 
 /// Compares silhouettes and masks of some frames of a sequence, in their order, and names what is wrong.

@@ -21,7 +21,13 @@ pub(super) fn unreadable(sequence: &Sequence, seen: &[Seen]) -> Vec<Finding> {
 }
 
 /// Frames of which something is true; of most of them, nothing can be made of the sequence.
-pub(super) fn listed(kind: Kind, sequence: &Sequence, all: usize, names: &[&str], what: &str) -> Option<Finding> {
+pub(super) fn listed(
+    kind: Kind,
+    sequence: &Sequence,
+    all: usize,
+    names: &[&str],
+    what: &str,
+) -> Option<Finding> {
     let first = names.first()?;
     let some = names.len();
     let finding =

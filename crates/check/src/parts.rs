@@ -29,7 +29,8 @@ pub(super) fn cameras<'a>(
     if by_camera.len() < 3 || 3 * by_camera.len() > 2 * pairs.len() {
         return (pairs, Vec::new());
     }
-    let fits = |pairs: &[Pair<'_>]| mean(pairs.iter().filter_map(|(_, s)| s.body.overlap(&s.mask))).unwrap_or(0.0);
+    let fits =
+        |pairs: &[Pair<'_>]| mean(pairs.iter().filter_map(|(_, s)| s.body.overlap(&s.mask))).unwrap_or(0.0);
     let mut means: Vec<f64> = by_camera.values().map(|pairs| fits(pairs)).collect();
     means.sort_by(f64::total_cmp);
     let usual = means[means.len() / 2];
@@ -45,7 +46,8 @@ pub(super) fn cameras<'a>(
             let detail = format!("body and masks overlap by {fit:.2}");
             Finding::new(Kind::Camera, &sequence.id, detail)
         };
-        let found = explained(sequence, &Neighbours::new(sequence, bodies, &own), &own).map_or_else(unexplained, |e| e.finding);
+        let found = explained(sequence, &Neighbours::new(sequence, bodies, &own), &own)
+            .map_or_else(unexplained, |e| e.finding);
         let detail = format!("the camera of {name} alone (others overlap by {usual:.2}): {}", found.detail);
         findings.push(Finding { detail, ..found });
     }
@@ -69,5 +71,6 @@ pub(super) fn misfits(sequence: &Sequence, pairs: &[Pair<'_>]) -> Option<Finding
         sequence.frames[*first].name
     );
     let spoils = 4 * bad.len() > overlaps.len();
-    (overlaps.len() >= FEWEST && usual > FINE).then(|| Finding { spoils, ..Finding::new(Kind::FrameOffset, &sequence.id, detail) })
+    (overlaps.len() >= FEWEST && usual > FINE)
+        .then(|| Finding { spoils, ..Finding::new(Kind::FrameOffset, &sequence.id, detail) })
 }

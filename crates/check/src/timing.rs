@@ -48,7 +48,8 @@ impl<'a> Neighbours<'a> {
         let mut pairs = evenly_spaced(pairs, Some(MOST));
         // What a camera saw is in the order of time.
         pairs.sort_by_key(|(seen, _)| (bodies.camera_of(seen), seen.index));
-        if pairs.iter().map(|(seen, _)| bodies.camera_of(seen)).collect::<BTreeSet<_>>().len() == pairs.len() {
+        if pairs.iter().map(|(seen, _)| bodies.camera_of(seen)).collect::<BTreeSet<_>>().len() == pairs.len()
+        {
             pairs.sort_by_key(|(seen, _)| seen.index);
         }
         let near = |i: usize| {
@@ -130,7 +131,8 @@ impl<'a> Neighbours<'a> {
 
     /// Single frames that fit another pose much better than frames do that fit their own.
     pub(super) fn strangers(&self) -> Option<Finding> {
-        let best = |frame: &Frame<'_>| frame.gains.iter().map(|(&s, &g)| (s, g)).max_by(|a, b| a.1.total_cmp(&b.1));
+        let best =
+            |frame: &Frame<'_>| frame.gains.iter().map(|(&s, &g)| (s, g)).max_by(|a, b| a.1.total_cmp(&b.1));
         let best: Vec<(&Frame<'_>, (isize, f64))> =
             self.frames.iter().filter_map(|frame| Some((frame, best(frame)?))).collect();
         if best.len() < FEWEST {
@@ -183,7 +185,12 @@ impl<'a> Neighbours<'a> {
         let own = mean(matches.iter().map(|m| m.own))?;
         let gain = mean(matches.iter().map(|m| m.gain))?;
         // Poses that are merely wrong fit others by chance, and many of them the same one.
-        if n < FEWEST && !evident(gain, own) || gain < BETTER || by_chance(gain, own) || 10 * moved.len() < 3 * n || 10 * distinct < 6 * moved.len() {
+        if n < FEWEST && !evident(gain, own)
+            || gain < BETTER
+            || by_chance(gain, own)
+            || 10 * moved.len() < 3 * n
+            || 10 * distinct < 6 * moved.len()
+        {
             return None;
         }
         let away = |m: &&Match<'_>| m.pose as isize - self.bodies.pose_of(m.pair.0) as isize;

@@ -27,17 +27,15 @@ const CLEAR: f64 = 0.005;
 
 /// A finding where masks fit far better under another focal length, or with a body of another size: whichever fits better, or,
 /// where both fit as well, whichever edges blame.
-pub(super) fn far_off(
-    sequence: &Sequence,
-    both: &[Pair<'_>],
-    to_blame: Option<Kind>,
-) -> Option<Explained> {
+pub(super) fn far_off(sequence: &Sequence, both: &[Pair<'_>], to_blame: Option<Kind>) -> Option<Explained> {
     let given = mean(both.iter().filter_map(|(_, s)| s.body.overlap(&s.mask)))?;
     let step = both.len().div_ceil(MOST).max(1);
     let best = |about: fn(&Seen, &Shadows) -> Option<[f64; 2]>| {
         let zoomed = |zoom: f64| {
             let pairs = both.iter().step_by(step);
-            let change = |pair: &Pair<'_>| Some(Change { size: [zoom; 2], about: about(pair.0, pair.1)?, by: [0.0; 2] });
+            let change = |pair: &Pair<'_>| {
+                Some(Change { size: [zoom; 2], about: about(pair.0, pair.1)?, by: [0.0; 2] })
+            };
             Some((zoom, mean(pairs.filter_map(|pair| overlap(pair, &change(pair)?)))?))
         };
         let of = |zooms: &mut dyn Iterator<Item = f64>| {
@@ -84,11 +82,13 @@ pub(super) fn stretched(sequence: &Sequence, both: &[Pair<'_>]) -> Option<Explai
         let change = |seen: &Seen| Change { size, about: [seen.camera.cx, seen.camera.cy], by: [0.0; 2] };
         mean(both.iter().step_by(step).filter_map(|pair| overlap(pair, &change(pair.0))))
     };
-    let tried = STRETCHES.iter().flat_map(|&factor| [("fx", factor, [factor, 1.0]), ("fy", factor, [1.0, factor])]);
+    let tried =
+        STRETCHES.iter().flat_map(|&factor| [("fx", factor, [factor, 1.0]), ("fy", factor, [1.0, factor])]);
     let fits = tried.filter_map(|(which, factor, size)| Some((which, factor, fit(size)?)));
     let (which, factor, fit) = fits.max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let detail =
-        format!("body and masks overlap by {fit:.2} for {given:.2} with about {factor:.2} times {which}: focal length");
+    let detail = format!(
+        "body and masks overlap by {fit:.2} for {given:.2} with about {factor:.2} times {which}: focal length"
+    );
     let finding = Finding::new(Kind::Camera, &sequence.id, detail);
     (fit > given + BETTER && fit > FITS).then_some(Explained { gain: fit - given, finding })
 }
@@ -103,7 +103,8 @@ pub(super) fn unexplained(sequence: &Sequence, both: &[Pair<'_>]) -> Option<Find
         "body and masks overlap by {given:.2} only, and no shift, order, size or lens that was tried explains it: poses, translation, \
          scale, model or masks of another person or convention"
     );
-    let finding = Finding { spoils: given < FITS, ..Finding::new(Kind::WrongGenderOrModel, &sequence.id, detail) };
+    let finding =
+        Finding { spoils: given < FITS, ..Finding::new(Kind::WrongGenderOrModel, &sequence.id, detail) };
     (given < DOUBTFUL).then_some(finding)
 }
 
@@ -133,7 +134,8 @@ pub(super) fn overlap((seen, Shadows { mask, body, .. }): &Pair<'_>, change: &Ch
     for y in (0..body.height).step_by(stride) {
         for x in (0..body.width).step_by(stride) {
             let (x, y) = (x as f64 + 0.5, y as f64 + 0.5);
-            let (u, v) = (middle_x + (x - across - middle_x) / wider, middle_y + (y - down - middle_y) / higher);
+            let (u, v) =
+                (middle_x + (x - across - middle_x) / wider, middle_y + (y - down - middle_y) / higher);
             if !inside(u, v) {
                 continue;
             }

@@ -10,7 +10,7 @@
 //! ```
 //! Sequences named `train*` are for fitting, those named `test*` for evaluation.
 
-use super::models::{Gender, Models, ShapeFit};
+use super::models::{Doubt, Gender, Models, ShapeFit};
 use super::poses::{self, PoseTrack};
 use super::{Capture, Error, Sequence, camera, error, listing};
 use super::{FrameFiles, FrameRef, FrameSource, MaskFile};
@@ -45,6 +45,8 @@ pub struct Subject {
     pub test: Vec<Sequence>,
     /// What was guessed, left out or not read, a sentence each.
     pub notes: Vec<String>,
+    /// What its own files say that may spoil its numbers.
+    pub doubts: Vec<Doubt>,
     /// Shapes that were asked of its body models.
     pub shapes: Vec<ShapeFit>,
 }
@@ -66,14 +68,16 @@ impl Subject {
         let joints = sequences().map(|s| s.body.skeleton.num_joints()).max();
         let capture = capture_of(folder, cameras.zip(joints))?;
         let id = listing::file_name(folder);
-        Ok(Self {
+        let subject = Self {
             id,
             capture,
             train,
             test,
             notes: models.notes().to_vec(),
-            shapes: models.shapes().to_vec(),
-        })
+            doubts: Vec::new(),
+            shapes: Vec::new(),
+        };
+        Ok(models.told(subject))
     }
 
     /// All sequences, training first.

@@ -65,6 +65,6 @@ pub use capture::Capture;
 pub use error::Error;
 pub use folder::Subject;
 pub use masks::{MaskFile, MaskReading};
-pub use models::{Gender, ShapeFit};
+pub use models::{Doubt, Doubtful, Gender, ShapeFit};
 pub use sequence::{FrameFiles, FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
 pub use sourced::{SourceDigest, Sourced};

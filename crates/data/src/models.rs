@@ -1,6 +1,6 @@
 //! The body models of a subject: which file it is, loaded once, and the shapes of it that sequences share.
 
-use super::folder::Options;
+use super::folder::{Options, Subject};
 use super::poses::PoseTrack;
 use super::{Error, body, listing, npy};
 use serde::{Deserialize, Serialize};
@@ -95,12 +95,31 @@ pub struct ShapeFit {
     pub directions: usize,
 }
 
+/// Something that a subject's own files say and that may spoil its numbers. It is among the subject's notes, too.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Doubt {
+    /// What it is about.
+    pub about: Doubtful,
+    /// The note.
+    pub note: String,
+}
+
+/// What a [`Doubt`] is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doubtful {
+    /// A lens that distorts.
+    Lens,
+    /// A body of another gender than the subject's.
+    Gender,
+}
+
 /// Body models that were loaded for a subject, and the shapes of them that its sequences share.
 pub(crate) struct Models<'a> {
     subject: &'a Path,
     options: &'a Options,
     loaded: BTreeMap<PathBuf, Model>,
     notes: Vec<String>,
+    doubts: Vec<Doubt>,
     shapes: Vec<ShapeFit>,
 }
 
@@ -112,7 +131,14 @@ struct Model {
 
 impl<'a> Models<'a> {
     pub(crate) fn new(subject: &'a Path, options: &'a Options) -> Self {
-        Self { subject, options, loaded: BTreeMap::new(), notes: Vec::new(), shapes: Vec::new() }
+        Self {
+            subject,
+            options,
+            loaded: BTreeMap::new(),
+            notes: Vec::new(),
+            doubts: Vec::new(),
+            shapes: Vec::new(),
+        }
     }
 
     /// What has to be said of the models and of the shapes that were asked for, each once and with its file.
@@ -120,9 +146,11 @@ impl<'a> Models<'a> {
         &self.notes
     }
 
-    /// The shapes that were asked for, each once.
-    pub(crate) fn shapes(&self) -> &[ShapeFit] {
-        &self.shapes
+    /// The subject with what is known of its models: shapes that were asked for, each once, and doubts.
+    pub(crate) fn told(self, mut subject: Subject) -> Subject {
+        subject.shapes.extend(self.shapes);
+        subject.doubts.extend(self.doubts);
+        subject
     }
 
     /// Adds what has to be said of a file.
@@ -158,6 +186,10 @@ impl<'a> Models<'a> {
         let body = self.posed(source, &path, track)?;
         if let Some(note) = self.other_gender(&path, gender) {
             self.note(&path, &note);
+            let doubt = Doubt { about: Doubtful::Gender, note: format!("{}: {note}", path.display()) };
+            if !self.doubts.contains(&doubt) {
+                self.doubts.push(doubt);
+            }
         }
         Ok(body)
     }

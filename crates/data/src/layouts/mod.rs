@@ -91,7 +91,15 @@ impl Request<'_> {
         test: Vec<Sequence>,
         notes: Vec<String>,
     ) -> Subject {
-        Subject { id: listing::file_name(self.folder), capture, train, test, notes, shapes: Vec::new() }
+        Subject {
+            id: listing::file_name(self.folder),
+            capture,
+            train,
+            test,
+            notes,
+            doubts: Vec::new(),
+            shapes: Vec::new(),
+        }
     }
 }
 

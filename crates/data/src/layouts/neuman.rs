@@ -22,7 +22,7 @@ use super::aligned;
 use super::colmap::{self, Registered};
 use super::{Layout, Part as Place, Request, Shared, split, triples};
 use crate::folder::Subject;
-use crate::models::{Family, Gender, Models};
+use crate::models::{Doubt, Doubtful, Family, Gender, Models};
 use crate::npz::Archive;
 use crate::poses::{Part, PoseTrack};
 use crate::{
@@ -73,7 +73,9 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     notes.extend_from_slice(models.notes());
     let poses = bodies.poses(&body).map_err(of_poses)?;
     let cameras: Vec<Camera> = captures.iter().map(|c| camera(c, by_hugs)).collect();
-    notes.extend(camera_notes(&captures, by_hugs));
+    notes.extend(centring(&captures, by_hugs));
+    let doubts: Vec<Doubt> = left_out(&captures).into_iter().collect();
+    notes.extend(doubts.iter().map(|doubt| doubt.note.clone()));
     if !by_hugs {
         notes.push(
             "poses of smpl_output_optimized.pkl and alignments.npy: HUGS's 4d_humans is not here".into(),
@@ -83,8 +85,8 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let scene = Scene { folder, captures, masks, shared };
     let sequences = [("train", train), ("test", test)].map(|(id, frames)| vec![scene.sequence(id, &frames)]);
     let [train, test] = sequences;
-    let shapes = models.shapes().to_vec();
-    Ok(Subject { shapes, ..request.subject(Capture::Monocular, train, test, notes) })
+    let subject = request.subject(Capture::Monocular, train, test, notes);
+    Ok(models.told(Subject { doubts, ..subject }))
 }
 
 /// Shapes and poses of all frames.
@@ -207,9 +209,9 @@ fn optimized(path: &Path, frames: usize) -> Result<Bodies, Error> {
         1 => archive.require("betas", "*")?,
         _ => archive.require("betas", "*,*")?,
     };
-    let (rows, width) = match betas.shape[..] {
-        [rows, width] => (rows, width),
-        _ => (1, betas.values.len()),
+    let rows = match betas.shape[..] {
+        [rows, _] => rows,
+        _ => 1,
     };
     let orient = archive.require("global_orient", "N,3")?;
     if orient.shape[0] != frames {
@@ -255,22 +257,23 @@ fn camera(capture: &Registered, centred: bool) -> Camera {
     Camera { cx, cy, ..camera }
 }
 
-fn camera_notes(captures: &[Registered], centred: bool) -> Vec<String> {
+/// What is said of principal points that are put into the centre.
+fn centring(captures: &[Registered], centred: bool) -> Option<String> {
     let off = |c: &Registered| {
         let (x, y) =
             (c.camera.cx - f64::from(c.camera.width) / 2.0, c.camera.cy - f64::from(c.camera.height) / 2.0);
         x.abs().max(y.abs())
     };
     let farthest = captures.iter().map(off).fold(0.0, f64::max);
-    let mut notes = Vec::new();
-    if centred && farthest > 0.01 {
-        notes
-            .push(format!("principal points are put into the centre, as by HUGS: {farthest:.2} pixels away"));
-    }
-    if captures.iter().any(|capture| capture.distorted) {
-        notes.push("the cameras' distortion is left out, as by NeuMan and HUGS".to_owned());
-    }
-    notes
+    (centred && farthest > 0.01)
+        .then(|| format!("principal points are put into the centre, as by HUGS: {farthest:.2} pixels away"))
+}
+
+/// What is said of distortion.
+fn left_out(captures: &[Registered]) -> Option<Doubt> {
+    let note = || "the cameras' distortion is left out, as by NeuMan and HUGS".to_owned();
+    let distorted = captures.iter().any(|capture| capture.distorted);
+    distorted.then(|| Doubt { about: Doubtful::Lens, note: note() })
 }
 
 /// Frames to train on and to test on.

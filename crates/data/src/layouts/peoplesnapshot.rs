@@ -53,8 +53,8 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let mut sequence = |id: &str| video.sequence(id, &splits.ranges(id), gender, &mut models);
     let (train, test) = (vec![sequence("train")?], vec![sequence("test")?]);
     notes.extend_from_slice(models.notes());
-    let shapes = models.shapes().to_vec();
-    Ok(Subject { shapes, ..request.subject(Capture::Monocular, train, test, notes) })
+    let subject = request.subject(Capture::Monocular, train, test, notes);
+    Ok(models.told(subject))
 }
 
 /// The subject's gender: as `config.json` says, else as its folder's name does; neutral with a note if neither does.

@@ -23,7 +23,7 @@ use super::{Layout, Part as Place, Request, Shared, triples};
 use crate::digest::Fingerprint;
 use crate::folder::Subject;
 use crate::hdf5::{Hdf5, Rows};
-use crate::models::{Family, Gender, Models};
+use crate::models::{Doubt, Doubtful, Family, Gender, Models};
 use crate::pickle::Pickle;
 use crate::poses::{Part, PoseTrack};
 use crate::{
@@ -67,16 +67,17 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     images.fit_within(count, masks.path(), "masks")?;
     let mut models = Models::new(folder, request.options);
     let (body, poses) = person(folder, count, gender, &mut models, &mut notes)?;
-    if !distortion.is_none() {
-        notes.push("frames and masks are undistorted with camera_k".to_owned());
-    }
+    let undone =
+        Doubt { about: Doubtful::Lens, note: "frames and masks are undistorted with camera_k".to_owned() };
+    let doubts: Vec<Doubt> = (!distortion.is_none()).then_some(undone).into_iter().collect();
+    notes.extend(doubts.iter().map(|doubt| doubt.note.clone()));
     notes.extend_from_slice(models.notes());
     let shared = Shared { body, poses, cameras: vec![camera.clone()].into() };
     let video = Video { folder, images, masks: Arc::new(masks), camera, distortion, shared };
     let sequence = |part: &str| Ok::<_, Error>(vec![video.sequence(part, splits.ranges(part)[0])?]);
     let (train, test) = (sequence("train")?, sequence("test")?);
-    let shapes = models.shapes().to_vec();
-    Ok(Subject { shapes, ..request.subject(Capture::Monocular, train, test, notes) })
+    let subject = request.subject(Capture::Monocular, train, test, notes);
+    Ok(models.told(Subject { doubts, ..subject }))
 }
 
 /// What both sequences are cut from.

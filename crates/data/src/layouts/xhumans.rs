@@ -113,8 +113,7 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     if person.expressive > 0 {
         notes.push(format!("expressions are left out ({} frames have one)", person.expressive));
     }
-    let shapes = person.models.shapes().to_vec();
-    Ok(Subject { shapes, ..request.subject(Capture::Hands, train, test, notes) })
+    Ok(person.models.told(request.subject(Capture::Hands, train, test, notes)))
 }
 
 fn betas(path: &Path) -> Result<Vec<f64>, Error> {
@@ -147,8 +146,9 @@ impl Person<'_> {
         let rows = Rows::middle(width, height);
         let cameras = cameras(&folder.join("render/cameras.npz"), images.len(), width, rows);
         // An image that is not there leaves one camera too many.
-        let cameras = cameras
-            .map_err(|error| depths.without_image(folder, &images).unwrap_or_else(|| error.about("camera")))?;
+        let cameras = cameras.map_err(|error| {
+            depths.without_image(folder, &images).unwrap_or_else(|| error.about("camera"))
+        })?;
         let (mut tracks, mut frames) = (Vec::new(), Vec::new());
         for (i, (&number, image)) in images.iter().enumerate() {
             let depth = depths.of(number, format!("depth_{number:06}.tiff"))?;
