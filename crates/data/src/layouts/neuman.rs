@@ -209,9 +209,9 @@ fn optimized(path: &Path, frames: usize) -> Result<Bodies, Error> {
         1 => archive.require("betas", "*")?,
         _ => archive.require("betas", "*,*")?,
     };
-    let rows = match betas.shape[..] {
-        [rows, _] => rows,
-        _ => 1,
+    let (rows, columns) = match betas.shape[..] {
+        [rows, columns] => (rows, columns),
+        _ => (1, betas.values.len()),
     };
     let orient = archive.require("global_orient", "N,3")?;
     if orient.shape[0] != frames {
@@ -232,7 +232,7 @@ fn optimized(path: &Path, frames: usize) -> Result<Bodies, Error> {
     let parts = vec![(Part::GlobalOrient, orient.values), (Part::BodyPose, body_pose.values)];
     Ok(Bodies {
         path: path.to_owned(),
-        betas: betas.values.chunks_exact(width.max(1)).map(<[f64]>::to_vec).collect(),
+        betas: betas.values.chunks_exact(columns.max(1)).map(<[f64]>::to_vec).collect(),
         track: PoseTrack::from_parts(path, Vec::new(), parts, translations)?.with_scales(&scale.values)?,
         places: None,
     })
