@@ -341,8 +341,8 @@ fn the_other_layouts_name_what_does_not_match() {
             (
                 "an image",
                 |f| remove(f.join("train/Take4/render/image/color_000011.png")),
-                "camera extrinsic",
-                "5 matrices; expected 4",
+                "images",
+                "frame 11 is missing; expected color_000011.png: depth has it",
             ),
             (
                 "no take",
