@@ -115,6 +115,16 @@ impl Error {
         self
     }
 
+    /// The same error about a thing that is read as another: a mask is decoded as an image.
+    #[must_use]
+    pub(crate) fn renamed(mut self, from: &str, to: &str) -> Self {
+        let (Self::Read { field, .. } | Self::Write { field, .. } | Self::Invalid { field, .. }) = &mut self;
+        if let Some(rest) = field.strip_prefix(from) {
+            *field = format!("{to}{rest}");
+        }
+        self
+    }
+
     /// The file that the error is about.
     pub fn path(&self) -> &Path {
         match self {
@@ -187,5 +197,7 @@ mod tests {
         assert_eq!(about("body_pose", "poses"), "poses body_pose");
         assert_eq!(about("betas[1]", "poses"), "betas[1]", "a shape is no pose");
         assert_eq!(about("weights[9]", "body model"), "body model weights[9]");
+        let mask = Error::invalid("x", "image size", "wrong", "right").renamed("image", "mask");
+        assert_eq!(mask.field(), "mask size");
     }
 }
