@@ -5,6 +5,8 @@ use skinsplat_core::scene::{Pose, PosedBody, RestBody, SceneError};
 /// A volume below this, of that of a cube with the area of the surface on one side, encloses nothing: a sphere has 0.094, a
 /// standing person 0.03.
 const OPEN: f64 = 0.004;
+/// The sum of the areas as vectors, of the sum of their lengths: 0 of a closed surface, which alone has a volume.
+const CLOSED: f64 = 0.05;
 
 /// What has to be said of a body whose faces look inwards at rest.
 pub(super) fn note(rest: &RestBody) -> Result<Option<String>, SceneError> {
@@ -12,13 +14,15 @@ pub(super) fn note(rest: &RestBody) -> Result<Option<String>, SceneError> {
     let vertices = &body.mesh().vertices;
     let count = vertices.len().max(1) as f64;
     let middle = vertices.iter().map(|v| v.as_dvec3()).sum::<glam::DVec3>() / count;
-    let (mut volume, mut area) = (0.0, 0.0);
+    let (mut volume, mut area, mut vectors) = (0.0, 0.0, glam::DVec3::ZERO);
     for face in &rest.faces {
         let [a, b, c] = face.map(|i| vertices[i as usize].as_dvec3() - middle);
         volume += a.dot(b.cross(c)) / 6.0;
-        area += (b - a).cross(c - a).length() / 2.0;
+        let vector = (b - a).cross(c - a) / 2.0;
+        area += vector.length();
+        vectors += vector;
     }
-    let inwards = volume < -OPEN * area * area.sqrt();
+    let inwards = vectors.length() < CLOSED * area && volume < -OPEN * area * area.sqrt();
     Ok(inwards.then(|| {
         "faces look inwards (they enclose a volume below 0): the body is mirrored, or its faces are wound the other way".to_owned()
     }))
