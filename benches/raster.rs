@@ -10,7 +10,7 @@
 //! First a table: the least wall time of many frames on one and on two threads (into existing memory, into fresh memory,
 //! and with the way back to the Gaussians' derivatives), and the thread time of each phase of the drawing. Then criterion's
 //! statistics of the figures that the README gives.
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints its results")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints its results")]
 
 #[path = "../tests/support/splat_scene.rs"]
 mod splat_scene;

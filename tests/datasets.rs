@@ -251,6 +251,13 @@ fn what_is_wrong_with_a_registry_is_named() {
     let registry = Registry::load(&path).unwrap();
     assert_eq!(registry.datasets[0].path, Some(folder.path().join("x")));
     assert!(!registry.datasets[0].is_available());
+    let split = |key: &str| format!("[dataset.splits]\n{key} = {{ train = [0, 1, 1], test = [2, 3, 1] }}\n");
+    let people = "subjects = [\"anna\", \"bob\"]\n[dataset.folders]\nbob = \"b\"\n";
+    for key in ["anna", "bob", "b"] {
+        std::fs::write(&path, format!("{good}{people}{}", split(key))).unwrap();
+        let dataset = &Registry::load(&path).unwrap().datasets[0];
+        assert!(dataset.split_of(if key == "b" { "bob" } else { key }).is_some(), "{key}");
+    }
     let cases = [
         (good.replace("title", "titel"), "line 3", "titel"),
         (good.replace("\"folder\"", "\"floppy\""), "line 4", "floppy"),
@@ -272,6 +279,22 @@ fn what_is_wrong_with_a_registry_is_named() {
             format!("{good}{}", "[[dataset.avatars]]\nname = \"h\"\npath = \"h.ply\"\n".repeat(2)),
             "dataset[0].avatars",
             "repeat",
+        ),
+        (
+            format!("{good}{}", split("y")),
+            "dataset[0].splits.\"y\"",
+            "no subject of this name; expected one of x",
+        ),
+        (format!("{good}{people}{}", split("ana")), "dataset[0].splits.\"ana\"", "is `anna` meant?"),
+        (
+            format!("{good}{people}{}b = {{ train = [0, 1, 1], test = [2, 3, 1] }}\n", split("bob")),
+            "dataset[0].splits.\"bob\"",
+            "the subject of splits.\"b\" again",
+        ),
+        (
+            format!("{good}subjects = [\"anna\"]\n[dataset.folders]\nana = \"a\"\n"),
+            "dataset[0].folders.\"ana\"",
+            "`anna`",
         ),
         ("[[dataset]".into(), "line 1", ""),
     ];

@@ -52,11 +52,10 @@ fn layouts() -> PathBuf {
 
 fn of_ava(layout: &str, folder: &str) -> Vec<f64> {
     let model = data("blender/models/anny_smpl24.npz");
-    let more = format!(
-        "model = {model:?}\n[dataset.splits]\nava = {{ train = [0, 5, 1], test = [6, 7, 1] }}\n\
-         own = {{ train = [0, 5, 1], test = [6, 7, 1] }}\n"
-    );
     let (parent, subject) = folder.rsplit_once('/').unwrap();
+    let more = format!(
+        "model = {model:?}\n[dataset.splits]\n{subject} = {{ train = [0, 5, 1], test = [6, 7, 1] }}\n"
+    );
     scores(
         layout,
         &registry(layout, "monocular", layouts().join(parent), subject, &more),
@@ -144,4 +143,148 @@ fn a_damaged_subject_is_one_line() {
     desk.put("small.toml", table("neuman", "default", TEXTURED));
     let run = args!["-q", "run", "small.toml", "--datasets", "sets.toml", "--out", "out"];
     desk.run(run).refuses(&["sparse/images.txt", "images", "COLMAP"], "no images.txt");
+}
+
+/// A subject on a desk of its own, to be damaged.
+struct Victim {
+    desk: Desk,
+    layout: &'static str,
+}
+
+impl Victim {
+    fn new(layout: &'static str, subject: &str) -> Self {
+        let desk = Desk::new();
+        program::copy(&layouts().join(layout).join(subject), &desk.path(&format!("data/{subject}")));
+        let (capture, model) = match layout {
+            "galabasketball" => ("multiview", None),
+            "xhumans" => ("hands", Some("blender/models/anny_smplx55.npz")),
+            _ => ("monocular", Some("blender/models/anny_smpl24.npz")),
+        };
+        let model = model.map_or(String::new(), |model| format!("model = {:?}\n", data(model)));
+        let split = format!("[dataset.splits]\n{subject} = {{ train = [0, 5, 1], test = [6, 7, 1] }}\n");
+        let split = if model.contains("smpl24") { split } else { String::new() };
+        desk.put("sets.toml", registry(layout, capture, "data".into(), subject, &(model + &split)));
+        Self { desk, layout }
+    }
+
+    /// What `check` finds that spoils numbers, by kind.
+    fn found(&self) -> Vec<String> {
+        self.seen(true)
+    }
+
+    /// What `check` finds that does or doesn't spoil numbers, by kind.
+    fn seen(&self, spoils: bool) -> Vec<String> {
+        let answer =
+            self.desk.run(args!["-q", "check", self.layout, "--datasets", "sets.toml", "--format", "json"]);
+        let seen: Value = serde_json::from_str(&answer.out).unwrap_or_else(|_| panic!("{answer:?}"));
+        let findings = seen["findings"].as_array().unwrap();
+        let findings = findings.iter().filter(|finding| finding["spoils"] == spoils);
+        let mut kinds: Vec<String> = findings.map(|f| f["kind"].as_str().unwrap().to_owned()).collect();
+        kinds.sort();
+        kinds.dedup();
+        kinds
+    }
+
+    /// The files of a folder of the subject, in order.
+    fn files(&self, folder: &str) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(self.desk.path("data").join(folder)).unwrap();
+        let mut files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+        files.sort();
+        files
+    }
+
+    /// Every file of a folder gets what the next one holds.
+    fn shift(&self, folder: &str) {
+        for pair in self.files(folder).windows(2) {
+            std::fs::copy(&pair[1], &pair[0]).unwrap();
+        }
+    }
+
+    /// Changes a number of a text: the one at this place among those of the line that begins so.
+    fn scale(&self, file: &str, line: &str, place: usize, separator: &str, factor: f64) {
+        let path = self.desk.path("data").join(file);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let scaled = |old: &str| {
+            let number = |(i, word): (usize, &str)| match i == place {
+                true => (factor * word.parse::<f64>().unwrap()).to_string(),
+                false => word.to_owned(),
+            };
+            old.split(separator).enumerate().map(number).collect::<Vec<_>>().join(separator)
+        };
+        let mut done = false;
+        let lines = text.lines().map(|old| match !done && old.starts_with(line) {
+            true => {
+                done = true;
+                scaled(old)
+            }
+            false => old.to_owned(),
+        });
+        let lines = lines.collect::<Vec<_>>().join("\n") + "\n";
+        assert_ne!(lines, text, "{file}");
+        std::fs::write(&path, lines).unwrap();
+    }
+}
+
+/// Masks the other way round: of `.npy` files of 0 and 1, or of images.
+fn invert(file: &Path) {
+    if file.extension().is_some_and(|extension| extension == "npy") {
+        let mut bytes = std::fs::read(file).unwrap();
+        let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+        bytes[start..].iter_mut().for_each(|value| *value = 1 - *value);
+        std::fs::write(file, bytes).unwrap();
+    } else {
+        let mut image = image::open(file).unwrap();
+        image.invert();
+        image.save(file).unwrap();
+    }
+}
+
+/// Layouts, a subject of each, its folders of images and of what tells its masks.
+const VICTIMS: [(&str, &str, &str, &str); 6] = [
+    ("neuman", "ava", "ava/images", "ava/4d_humans/sam_segmentations"),
+    ("neuman", "own", "own/images", "own/segmentations"),
+    ("peoplesnapshot", "ava", "ava/images", "ava/masks"),
+    ("peoplesnapshot-raw", "ava", "ava/frames", ""),
+    ("xhumans", "00099", "00099/train/Take4/render/image", "00099/train/Take4/render/depth"),
+    ("galabasketball", "ben", "ben/2", "ben/2"),
+];
+
+#[test]
+fn nothing_is_found_in_any_layout_that_is_whole() {
+    for (layout, subject, ..) in VICTIMS {
+        let whole = Victim::new(layout, subject);
+        assert_eq!(whole.found(), [""; 0], "{layout}/{subject}");
+        // These were taken through a lens, and say so.
+        let lens = layout == "peoplesnapshot-raw" || subject == "own";
+        let said: &[&str] = if lens { &["camera"] } else { &[] };
+        assert_eq!(whole.seen(false), said, "{layout}/{subject}");
+    }
+}
+
+#[test]
+fn damage_is_found_by_its_kind_in_every_layout() {
+    for (layout, subject, images, masks) in VICTIMS {
+        let at = format!("{layout}/{subject}");
+        let missing = Victim::new(layout, subject);
+        std::fs::remove_file(&missing.files(images)[1]).unwrap();
+        assert_eq!(missing.found(), ["missing-frames"], "{at}");
+        // The masks of the raw recordings are in one file with all others.
+        if !masks.is_empty() {
+            let shifted = Victim::new(layout, subject);
+            shifted.shift(masks);
+            assert_eq!(shifted.found(), ["frame-offset"], "{at}");
+        }
+        if ["neuman", "peoplesnapshot"].contains(&layout) {
+            let inverted = Victim::new(layout, subject);
+            inverted.files(masks).iter().for_each(|file| invert(file));
+            assert_eq!(inverted.found(), ["inverted-masks"], "{at}");
+        }
+        let other = Victim::new(layout, subject);
+        match layout {
+            "neuman" => other.scale(&format!("{subject}/sparse/cameras.txt"), "3 ", 4, " ", 1.4),
+            "galabasketball" => other.scale("ben/camera/2.txt", "", 0, ",", 1.3),
+            _ => continue,
+        }
+        assert_eq!(other.found(), ["camera"], "{at}");
+    }
 }

@@ -1,7 +1,7 @@
 //! A thousand frames take the memory of a hundred, and ten times their time. SKINSPLAT_MANY_FRAMES=10000 asks for more:
 //! `SKINSPLAT_MANY_FRAMES=10000 cargo test --release --test many_frames -- --nocapture`.
 #![cfg(target_os = "linux")]
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "support/program.rs"]
 mod program;

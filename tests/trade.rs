@@ -1,5 +1,5 @@
 //! `reproduce trade`: what it writes, what it refuses, and that only times differ from run to run.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "support/program.rs"]
 mod program;
@@ -207,6 +207,7 @@ fn subject(body: &RestBody) -> Subject {
         train: Vec::new(),
         test: vec![sequence],
         notes: Vec::new(),
+        doubts: Vec::new(),
         shapes: Vec::new(),
     }
 }

@@ -5,7 +5,8 @@ use super::output::{Format, emit, emit_json};
 use super::{Context, Exit};
 use anyhow::Result;
 use serde::Serialize;
-use skinsplat_check::{self as check, Finding, SequenceFit};
+use skinsplat_check::{self as check, Finding, Kind, SequenceFit};
+use skinsplat_data::Subject;
 use skinsplat_data::select::evenly_spaced;
 use std::path::PathBuf;
 
@@ -47,27 +48,15 @@ struct Seen {
 impl Check {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let mut seen = Seen { sequences: Vec::new(), findings: Vec::new() };
-        for (name, subject) in self.data.subjects(self.name.as_deref())? {
-            let subject = match subject {
-                Ok(subject) => subject,
+        let subjects = self.data.subjects(self.name.as_deref())?;
+        if self.name.is_none() {
+            context.note(format!("no data set was named: all subjects that are there, {}", subjects.len()));
+        }
+        for (name, subject) in subjects {
+            match subject {
+                Ok(subject) => self.look_at(&name, &subject, &mut seen, context)?,
                 Err(error) => {
                     seen.findings.push(Finding { sequence: name, ..Finding::of_error(&error) });
-                    continue;
-                }
-            };
-            subject.notes.iter().for_each(|note| context.note(format!("{name}: {note}")));
-            let own = check::subject(&subject).into_iter();
-            seen.findings.extend(own.map(|f| Finding { sequence: name.clone(), ..f }));
-            for sequence in subject.sequences() {
-                let all: Vec<usize> = (0..sequence.frames.len()).collect();
-                let frames = evenly_spaced(&all, self.limit.map(|limit| limit as usize));
-                let id = format!("{name}/{}", sequence.id);
-                context.note(format!("{id}: {} frames", frames.len()));
-                let (fit, findings) = check::sequence(sequence, &frames);
-                seen.sequences.push(SequenceFit { id: id.clone(), ..fit });
-                seen.findings.extend(findings.into_iter().map(|f| Finding { sequence: id.clone(), ..f }));
-                if let Some(folder) = &self.out {
-                    check::write_overlays(sequence, &frames, &folder.join(&name))?;
                 }
             }
         }
@@ -78,6 +67,40 @@ impl Check {
         let spoilt = seen.findings.iter().any(|finding| finding.spoils);
         Ok(if spoilt { Exit::Failed } else { Exit::Success })
     }
+
+    fn look_at(&self, name: &str, subject: &Subject, seen: &mut Seen, context: Context) -> Result<()> {
+        subject.notes.iter().for_each(|note| context.note(format!("{name}: {note}")));
+        let own = check::subject(subject).into_iter();
+        seen.findings.extend(own.map(|finding| Finding { sequence: name.to_owned(), ..finding }));
+        let others = self.data.in_genders(name);
+        for sequence in subject.sequences() {
+            let all: Vec<usize> = (0..sequence.frames.len()).collect();
+            let frames = evenly_spaced(&all, self.limit.map(|limit| limit as usize));
+            let id = format!("{name}/{}", sequence.id);
+            context.note(format!("{id}: {} frames", frames.len()));
+            let (fit, findings) = check::sequence(sequence, &frames);
+            let gender = others.iter().find_map(|(gender, other)| {
+                let other = other.sequences().find(|other| other.id == sequence.id)?;
+                check::of_another_gender([sequence, other], gender.name(), &frames)
+            });
+            seen.sequences.push(SequenceFit { id: id.clone(), ..fit });
+            let found = explained_by(gender, findings).into_iter();
+            seen.findings.extend(found.map(|finding| Finding { sequence: id.clone(), ..finding }));
+            if let Some(folder) = &self.out {
+                check::write_overlays(sequence, &frames, &folder.join(name))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What was found, in which the body of another gender explains a size that is off.
+fn explained_by(gender: Option<Finding>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    if gender.is_some() {
+        findings.retain(|finding| !matches!(finding.kind, Kind::Camera | Kind::WrongGenderOrModel));
+    }
+    findings.extend(gender);
+    findings
 }
 
 fn text(Seen { sequences, findings }: &Seen) -> String {

@@ -6,7 +6,7 @@ use skinsplat::experiment::{AvatarRecipe, Experiment, Unreadable};
 use skinsplat::run::{Library, LoadedDataset, RegisteredAvatar};
 use skinsplat_core::choice::one_of;
 use skinsplat_data::folder::Options;
-use skinsplat_data::{Error, Subject};
+use skinsplat_data::{Error, Gender, Subject};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -97,6 +97,18 @@ impl Data {
         Ok(found)
     }
 
+    /// `DATASET/SUBJECT` with the body of each gender of which there is one.
+    pub(super) fn in_genders(&self, name: &str) -> Vec<(Gender, Subject)> {
+        let Some((dataset, subject)) = name.split_once('/') else { return Vec::new() };
+        let Ok(registry) = self.registry() else { return Vec::new() };
+        let dataset = registry.datasets.iter().find(|candidate| candidate.id == dataset);
+        let load = |gender| {
+            let options = Options { gender: Some(gender), ..self.options() };
+            Some((gender, dataset?.load_one(subject, &options).ok()?))
+        };
+        Gender::ALL.into_iter().filter_map(load).collect()
+    }
+
     /// `DATASET/SUBJECT` of the first subject that is there.
     pub(super) fn first_subject(&self) -> Result<Option<String>> {
         for dataset in wanted(&self.registry()?, None)? {
@@ -136,7 +148,8 @@ impl Data {
         let avatars = avatars.map(|a| RegisteredAvatar { name: a.name.clone(), path: a.path.clone() });
         let id = asking.map_or_else(|| dataset.id.clone(), Experiment::data_id);
         let title = dataset.title.clone();
-        let splits_given = dataset.subject_ids()?.into_iter().filter(|id| dataset.has_split(id)).collect();
+        let splits_given =
+            dataset.subject_ids()?.into_iter().filter(|id| dataset.split_of(id).is_some()).collect();
         Ok(LoadedDataset { id, title, subjects, avatars: avatars.collect(), splits_given, unreadable })
     }
 

@@ -13,6 +13,8 @@ use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, Binding, Body, Image, Mask};
 use skinsplat_data::arrays::Arrays;
 use skinsplat_data::avatar::{Canonical, LoadedAvatar, read_avatar};
+use skinsplat_data::entries::{Entry, entries};
+use skinsplat_data::layouts::readers;
 use skinsplat_data::poses::PoseTrack;
 use skinsplat_data::{body, camera, frames, poses};
 use std::path::{Path, PathBuf};
@@ -194,24 +196,46 @@ fn clips_text(path: &Path) -> Result<String> {
 /// An `.npz` archive or a pickle: its arrays, and what they are together.
 fn arrays_text(path: &Path) -> Result<String> {
     let mut arrays = Arrays::open(path, "archive")?;
-    let mut text = line("kind", arrays.kind());
-    for name in arrays.names() {
-        text += &line(&name.escape_debug().to_string(), arrays.describe(&name)?);
+    let entries = entries(&mut arrays)?;
+    let mut text = line("kind", arrays.kind()) + &entries_text(&entries);
+    let meaning = meaning_text(path, &arrays);
+    let readers = readers(path);
+    if readers.is_empty() {
+        return Ok(text + &meaning?.unwrap_or_else(|| unread_text(&arrays.names(), &[])));
     }
+    // A part of a data set may be called as another kind of file is, and be less than one.
+    text += &meaning.ok().flatten().unwrap_or_default();
+    let names: Vec<String> = entries.into_iter().map(|entry| entry.name).collect();
+    Ok(text + &parts::read_by(&readers, &names))
+}
+
+/// Entries that are listed.
+const LISTED_ENTRIES: usize = 40;
+
+fn entries_text(entries: &[Entry]) -> String {
+    let one = |entry: &Entry| {
+        let reach = entry.reach.map_or(String::new(), |reach| format!(", {reach}"));
+        line(&entry.name.escape_debug().to_string(), format!("{}{reach}", entry.what))
+    };
+    let more = entries.len().saturating_sub(LISTED_ENTRIES);
+    let rest = (more > 0).then(|| line("…", format!("{more} more")));
+    entries.iter().take(LISTED_ENTRIES).map(one).chain(rest).collect()
+}
+
+/// What the arrays of a file are together, if their names tell.
+fn meaning_text(path: &Path, arrays: &Arrays) -> Result<Option<String>> {
     let has = |name: &str| arrays.contains(name);
-    if has("means") && has("quats") {
-        return Ok(text + &avatar_text(&read_avatar(path)?));
-    }
-    if has("v_template") {
-        return Ok(text + &body_text(&body::read(path)?) + &unread_text(&arrays.names(), &body::ARRAYS));
-    }
-    if has("intrinsic") || has("K") {
-        return Ok(text + &cameras_text(path)?);
-    }
-    if poses::is_motion(&arrays) {
-        return Ok(text + &motion_text(&poses::load(path)?));
-    }
-    Ok(text + &unread_text(&arrays.names(), &[]))
+    Ok(Some(if has("means") && has("quats") {
+        avatar_text(&read_avatar(path)?)
+    } else if has("v_template") {
+        body_text(&body::read(path)?) + &unread_text(&arrays.names(), &body::ARRAYS)
+    } else if has("intrinsic") || has("K") {
+        cameras_text(path)?
+    } else if poses::is_motion(arrays) {
+        motion_text(&poses::load(path)?)
+    } else {
+        return Ok(None);
+    }))
 }
 
 /// Arrays that nothing reads.

@@ -13,7 +13,7 @@ pub(super) fn listen(advice: String) -> std::io::Result<()> {
         if let Some(signal) = signals.forever().next() {
             let _abandoned = atomic::abandon();
             say(format_args!("stopped by {}: {advice}", if signal == SIGINT { "SIGINT" } else { "SIGTERM" }));
-            #[allow(clippy::exit, reason = "other threads are in the middle of what nobody waits for")]
+            #[expect(clippy::exit, reason = "other threads are in the middle of what nobody waits for")]
             std::process::exit(128 + signal);
         }
     })?;

@@ -5,6 +5,7 @@ use super::data::Data;
 use super::output::{emit, table_format, written};
 use super::planning::known_experiments;
 use anyhow::Result;
+use skinsplat::datasets::{Dataset, Presence};
 use skinsplat_fit::RECIPES;
 use skinsplat_metrics::{METRICS, Metric, PROTOCOLS, SsimVariant, VARIANT_IDS};
 use skinsplat_posing::PRESETS;
@@ -66,28 +67,39 @@ impl List {
     }
 
     fn datasets(&self) -> Result<Table> {
-        let here = |d: &skinsplat::datasets::Dataset| match (d.is_available(), &d.path) {
-            (true, _) => {
-                d.first_problem().map_or("available".to_owned(), |why| format!("not available: {why}"))
-            }
-            (false, _) if d.reader().is_none() => {
-                format!("not available: nothing reads the layout {} yet", d.layout)
-            }
-            (false, Some(_)) if d.is_begun() => {
-                let why = d.first_problem().map_or(String::new(), |why| format!("; {why}"));
-                format!("not complete: no folder {}{why}", names(&d.missing_folders()))
-            }
-            (false, Some(path)) => format!("not available: looked in {}", absolute(path).display()),
-            (false, None) => "not available".to_owned(),
-        };
         let registry = self.data.registry()?;
-        let rows =
-            registry.datasets.iter().map(|d| (d.id.clone(), [d.title.clone(), d.licence.clone(), here(d)]));
+        let rows = registry
+            .datasets
+            .iter()
+            .map(|d| (d.id.clone(), [d.title.clone(), d.licence.clone(), presence(d)]));
         Ok(listing(
             "Datasets",
             [("title", "Title"), ("licence", "Licence"), ("available", "Available")],
             rows,
         ))
+    }
+}
+
+/// How much of a data set is there, in words.
+fn presence(dataset: &Dataset) -> String {
+    match (dataset.presence(), &dataset.path) {
+        (Presence::Complete, _) => "available".to_owned(),
+        (Presence::Partial { subjects, missing, broken }, _) => {
+            let left = subjects.saturating_sub(missing.len() + broken.len());
+            let gone = (!missing.is_empty()).then(|| format!("no folder {}", names(&missing)));
+            let why = broken.first().map(|first| match broken.len() {
+                1 => format!("one cannot be loaded: {first}"),
+                count => format!("{count} cannot be loaded, the first: {first}"),
+            });
+            let reasons: Vec<String> = gone.into_iter().chain(why).collect();
+            format!("not complete: {left} of {subjects} subjects; {}", reasons.join("; "))
+        }
+        (Presence::Broken(error), _) => format!("not available: {error}"),
+        (Presence::Absent, _) if !dataset.is_generated() && dataset.reader().is_none() => {
+            format!("not available: nothing reads the layout {} yet", dataset.layout)
+        }
+        (Presence::Absent, Some(path)) => format!("not there: looked in {}", absolute(path).display()),
+        (Presence::Absent, None) => "not there: the registry names no path".to_owned(),
     }
 }
 

@@ -35,14 +35,16 @@ Examples:
 
 impl Plan {
     pub(super) fn run(&self) -> Result<Exit> {
-        let Planned { plan, library, .. } = self.planning.plan()?;
+        let planned = self.planning.plan()?;
+        let left_over: String = planned.left_over().iter().map(|note| format!("{note}\n")).collect();
+        let Planned { plan, library, .. } = planned;
         match self.format {
             Format::Json => emit_json(&plan)?,
             Format::Text => {
                 let broken = library.unreadable().map(|(dataset, own)| {
                     format!("cannot be loaded: {dataset}/{}: {}\n", own.subject, own.problem)
                 });
-                emit(&(self.text(&plan)? + &broken.collect::<String>()))?;
+                emit(&(self.text(&plan)? + &broken.collect::<String>() + &left_over))?;
             }
         }
         Ok(Exit::Success)

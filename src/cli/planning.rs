@@ -6,7 +6,8 @@ use super::selection::name_and_path;
 use anyhow::{Result, bail};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use skinsplat::experiment::{
-    self, AvatarRecipe, Experiment, GIVEN_AVATAR, GivenWeights, Options, Plan, Profile, Subset, Variant,
+    self, AvatarRecipe, AvatarSource, Experiment, GIVEN_AVATAR, GivenWeights, Options, Plan, PlannedAvatar,
+    Profile, Subset, Variant,
 };
 use skinsplat::run::{Library, RegisteredAvatar};
 use skinsplat_core::choice::one_of;
@@ -78,6 +79,20 @@ pub(super) struct Planned {
     pub(super) experiments: Vec<Experiment>,
     pub(super) library: Library,
     pub(super) networks: Networks,
+}
+
+impl Planned {
+    /// What lies in folders of renders and takes no part.
+    pub(super) fn left_over(&self) -> BTreeSet<String> {
+        let said = |avatar: &PlannedAvatar| match &avatar.source {
+            AvatarSource::Renders(renders) => {
+                let others = renders.left_over.as_ref()?;
+                Some(format!("{}: {others} of {}", renders.folder.display(), renders.sequence))
+            }
+            _ => None,
+        };
+        self.plan.avatars.iter().filter_map(said).collect()
+    }
 }
 
 impl Planning {

@@ -124,6 +124,7 @@ impl Run {
             .filter(|path| !path.starts_with(&self.out))
             .try_for_each(|path| atomic::check(path))?;
         let mut planned = self.planning.plan()?;
+        planned.left_over().into_iter().for_each(|note| context.note(note));
         let motion = self.motion(&mut planned, context)?;
         let mut provenance = Provenance::starting(&planned.plan);
         let stopwatch = Stopwatch::after_planning(start.elapsed().as_secs_f64());

@@ -5,7 +5,27 @@ use skinsplat_data::Error;
 use skinsplat_data::folder::{Options, Subject};
 use skinsplat_synthetic as synthetic;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// How much of a data set is there.
+#[derive(Debug)]
+pub enum Presence {
+    /// Every subject can be loaded.
+    Complete,
+    /// Some folders are there. What is not there or cannot be loaded is a gap in tables.
+    Partial {
+        /// Subjects that the registry lists.
+        subjects: usize,
+        /// Folders of subjects that are not there.
+        missing: Vec<PathBuf>,
+        /// What is wrong with subjects that are there.
+        broken: Vec<Error>,
+    },
+    /// No folder is there, or nothing reads them.
+    Absent,
+    /// The entry itself cannot be used.
+    Broken(Error),
+}
 
 impl Dataset {
     /// Loads every subject; no image is decoded or generated.
@@ -31,14 +51,25 @@ impl Dataset {
         Ok(self.path.as_deref().map(|path| name(path).unwrap_or_default()).into_iter().collect())
     }
 
-    /// Why a subject cannot be loaded: the first such reason.
-    pub fn first_problem(&self) -> Option<Error> {
-        let ids = match self.subject_ids() {
-            Ok(ids) => ids,
-            Err(problem) => return Some(problem),
-        };
-        let read = ids.iter().filter(|_| !self.is_generated());
-        read.map(|id| self.load_one(id, &Options::default())).find_map(Result::err)
+    /// How much of it a command would find. Loads every subject.
+    pub fn presence(&self) -> Presence {
+        if self.is_generated() {
+            return self.subject_ids().map_or_else(Presence::Broken, |_| Presence::Complete);
+        }
+        if self.reader().is_none() || !self.is_begun() {
+            return Presence::Absent;
+        }
+        let missing = self.missing_folders();
+        let there = |(_, folder): &(String, PathBuf)| !missing.contains(folder);
+        let ids = self.subject_ids().unwrap_or_default();
+        let subjects = ids.len();
+        let found = ids.into_iter().zip(self.subject_folders().unwrap_or_default()).filter(there);
+        let broken: Vec<Error> =
+            found.filter_map(|(id, _)| self.load_one(&id, &Options::default()).err()).collect();
+        match missing.is_empty() && broken.is_empty() {
+            true => Presence::Complete,
+            false => Presence::Partial { subjects, missing, broken },
+        }
     }
 
     /// Loads one of [`Dataset::subject_ids`].
@@ -62,6 +93,7 @@ impl Dataset {
                 train,
                 test,
                 notes: Vec::new(),
+                doubts: Vec::new(),
                 shapes: Vec::new(),
             });
         }

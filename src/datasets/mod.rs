@@ -1,6 +1,9 @@
 //! `datasets.toml`: which datasets exist, where they lie, under which licence.
 
+mod keys;
 mod load;
+
+pub use load::Presence;
 
 use crate::toml_problem::TomlProblem;
 use serde::{Deserialize, Serialize};
@@ -55,7 +58,7 @@ pub struct Dataset {
     /// Folder names of subjects that experiments call otherwise.
     #[serde(default)]
     pub folders: BTreeMap<String, String>,
-    /// Frames to train and test on, by subject, for layouts that do not say.
+    /// Frames to train and test on, by subject (its id or its folder's name), for layouts that do not say.
     #[serde(default)]
     pub splits: BTreeMap<String, Split>,
     /// What the generator of a synthetic dataset is given.
@@ -103,7 +106,8 @@ impl Registry {
     /// Loads a `datasets.toml`; paths in it are relative to its folder.
     ///
     /// # Errors
-    /// An unreadable file, unknown or missing keys, two datasets of one id, a path that leaves out its subjects.
+    /// An unreadable file, unknown or missing keys, two datasets of one id, a path that leaves out its subjects, splits or folders
+    /// of nobody.
     pub fn load(path: &Path) -> Result<Self, Error> {
         Self::parse(&error::read_text(path, "registry", "a datasets.toml")?, path)
     }
@@ -168,6 +172,9 @@ impl Registry {
             if let Some(twice) = dataset.subjects.iter().find(|name| !seen.insert(name.as_str())) {
                 return Err(invalid("subjects", format!("{twice:?} again"), "each subject once"));
             }
+            if let Some((field, problem, expected)) = dataset.fault_of_keys() {
+                return Err(invalid(&field, problem, &expected));
+            }
             let names: BTreeSet<&str> = dataset.avatars.iter().map(|avatar| avatar.name.as_str()).collect();
             if names.len() < dataset.avatars.len() || names.contains("") {
                 return Err(invalid("avatars", "names that repeat or are empty".into(), "a name for each"));
@@ -220,11 +227,6 @@ impl Dataset {
         self.subject_folders().unwrap_or_default().into_iter().filter(|folder| !folder.is_dir()).collect()
     }
 
-    /// True if it says which frames of a subject are for what.
-    pub fn has_split(&self, subject: &str) -> bool {
-        self.splits.contains_key(self.folders.get(subject).map_or(subject, String::as_str))
-    }
-
     /// The subjects' folders; `None` without a path.
     pub fn subject_folders(&self) -> Option<Vec<PathBuf>> {
         let path = self.path.as_ref()?;
@@ -249,8 +251,9 @@ impl Dataset {
             let expected = format!("{} (convert the data first)", known.join(" or "));
             return Err(Error::invalid(folder, "layout", format!("no reader for {}", self.layout), expected));
         };
-        let name = folder.file_name().unwrap_or_default().to_string_lossy();
-        let split = self.splits.get(name.as_ref());
+        let place = self.subject_folders().unwrap_or_default().iter().position(|own| own == folder);
+        let id = place.and_then(|place| self.subject_ids().ok()?.into_iter().nth(place));
+        let split = id.and_then(|id| self.split_of(&id));
         (reader.load)(&Request { folder, split, options: &options })
     }
 }

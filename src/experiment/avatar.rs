@@ -32,7 +32,7 @@ pub struct PlannedAvatar {
 /// Where an avatar comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "from", rename_all = "kebab-case")]
-#[allow(clippy::large_enum_variant, reason = "a plan holds few, and a fit is the usual one")]
+#[expect(clippy::large_enum_variant, reason = "a plan holds few, and a fit is the usual one")]
 pub enum AvatarSource {
     /// A file that somebody else made.
     File {

@@ -4,6 +4,7 @@ use super::spec::OWN_BODIES;
 use serde::{Deserialize, Serialize};
 use skinsplat_data::Capture;
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::PathBuf;
 
 /// The part that a sequence plays.
@@ -82,7 +83,10 @@ pub struct RenderedFrames {
     /// The images that were found, by the names of the frames.
     #[serde(serialize_with = "super::lossy::paths")]
     pub frames: BTreeMap<String, PathBuf>,
-    /// Digest of them all.
+    /// Images that are of no frame, if there are any. No key depends on them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_over: Option<LeftOver>,
+    /// Digest of the images that were found.
     pub digest: String,
     /// Gaussians of the avatar, if the folder says so.
     pub splats: Option<u64>,
@@ -90,6 +94,23 @@ pub struct RenderedFrames {
     pub bytes: Option<u64>,
     /// Time of a frame in milliseconds, if the folder says so.
     pub milliseconds: Option<f64>,
+}
+
+/// Images in a folder of renders that are of no frame of the sequence.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LeftOver {
+    /// How many.
+    pub count: usize,
+    /// The name of the first.
+    pub first: String,
+}
+
+impl fmt::Display for LeftOver {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { count, first } = self;
+        let images = if *count == 1 { "image is" } else { "images are" };
+        write!(f, "{count} more {images} of no frame, such as {first}")
+    }
 }
 
 /// An avatar that was fitted elsewhere.

@@ -32,7 +32,8 @@ mod versions;
 
 pub use avatar::{AvatarSource, PlannedAvatar, PlannedFit, TrainingFrames};
 pub use dataset::{
-    AvatarFile, AvatarState, Dataset, FrameInfo, RenderedFrames, Role, SequenceInfo, SubjectInfo, Unreadable,
+    AvatarFile, AvatarState, Dataset, FrameInfo, LeftOver, RenderedFrames, Role, SequenceInfo, SubjectInfo,
+    Unreadable,
 };
 pub use embedded::{EMBEDDED, FURTHER};
 pub use error::Error;

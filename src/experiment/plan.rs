@@ -2,7 +2,7 @@
 
 use super::avatar::{PlannedAvatar, Planner};
 use super::rows::{DataRow, Source, rows_of};
-use super::subset::{subjects_are_of_a_table, subset_names_something};
+use super::subset::{subjects_are_of_a_table, subjects_can_be_loaded, subset_names_something};
 use super::{
     CodeVersions, Dataset, Error, Experiment, Options, PoseNoise, SequenceInfo, Shard, Slices, SubjectInfo,
     Unreadable, Variant, catalog,
@@ -189,6 +189,7 @@ pub fn plan(experiments: &[Experiment], datasets: &[Dataset], options: &Options)
         numbered.map(|(index, experiment)| builder.table(index, experiment)).collect::<Result<_, _>>()?;
     let Builder { avatars, jobs, .. } = builder;
     if jobs.is_empty() {
+        subjects_can_be_loaded(datasets, options)?;
         subjects_are_of_a_table(experiments, datasets, options)?;
     }
     let digest = Plan::digest_of(options, &tables, &jobs);

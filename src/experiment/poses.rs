@@ -21,7 +21,6 @@ pub enum TestPoses {
 
 impl TestPoses {
     /// True for [`TestPoses::AsGiven`].
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
     pub(super) fn are_given(&self) -> bool {
         *self == Self::AsGiven
     }

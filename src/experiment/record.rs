@@ -36,7 +36,7 @@ impl PartialEq for FrameRecord {
 /// Score or failure of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[allow(clippy::large_enum_variant, reason = "scored is the usual one")]
+#[expect(clippy::large_enum_variant, reason = "scored is the usual one")]
 pub enum Outcome {
     /// Rendered and scored.
     Scored {
@@ -82,7 +82,6 @@ pub struct Seconds {
     pub fit: f64,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn nothing(seconds: &f64) -> bool {
     *seconds == 0.0
 }

@@ -103,7 +103,6 @@ pub struct Experiment {
     pub splits: Vec<Split>,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(number: &u64) -> bool {
     *number == 0
 }

@@ -25,14 +25,32 @@ pub(super) fn subjects_are_of_a_table(
     Err(Error::invalid("subset", "subjects", problem, one_of(&asked[0], &known)))
 }
 
-/// Refuses a subset that would leave nothing because of a name that does not exist.
+/// Refuses subjects of whom one cannot be loaded, where that leaves nothing to do: the first such reason.
+pub(super) fn subjects_can_be_loaded(datasets: &[Dataset], options: &Options) -> Result<(), Error> {
+    let asked = &options.subset.subjects;
+    let mut unreadable = datasets.iter().flat_map(|dataset| &dataset.unreadable);
+    match unreadable.find(|own| asked.contains(&own.subject)) {
+        None => Ok(()),
+        Some(broken) => {
+            // The reason says itself what was expected.
+            let (why, expected) = (broken.problem.rsplit_once("; expected "))
+                .unwrap_or((&broken.problem, "a subject that can be loaded"));
+            let problem = format!("`{}` cannot be loaded: {why}", broken.subject);
+            Err(Error::invalid("subset", "subjects", problem, expected))
+        }
+    }
+}
+
+/// Refuses a subset that would leave nothing because of a name that does not exist. Subjects that cannot be loaded exist: tables
+/// say what is wrong with them.
 pub(super) fn subset_names_something(
     experiments: &[Experiment],
     datasets: &[Dataset],
     options: &Options,
 ) -> Result<(), Error> {
-    let subjects: BTreeSet<&str> =
-        datasets.iter().flat_map(|d| &d.subjects).map(|subject| subject.id.as_str()).collect();
+    let readable = datasets.iter().flat_map(|d| &d.subjects).map(|subject| subject.id.as_str());
+    let unreadable = datasets.iter().flat_map(|d| &d.unreadable).map(|own| own.subject.as_str());
+    let subjects: BTreeSet<&str> = readable.chain(unreadable).collect();
     let variants: BTreeSet<&str> =
         experiments.iter().flat_map(|e| &e.variants).flat_map(Variant::names).collect();
     let subset = &options.subset;
@@ -40,11 +58,6 @@ pub(super) fn subset_names_something(
         [("subjects", &subset.subjects, subjects), ("variants", &subset.variants, variants)]
     {
         if let Some(stranger) = asked.iter().find(|id| !known.contains(id.as_str())) {
-            let broken = datasets.iter().flat_map(|d| &d.unreadable).find(|own| own.subject == *stranger);
-            if let (Some(broken), true) = (broken, key == "subjects") {
-                let problem = format!("`{stranger}` cannot be loaded: {}", broken.problem);
-                return Err(Error::invalid("subset", key, problem, "a subject that can be loaded"));
-            }
             let known: Vec<&str> = known.into_iter().collect();
             let expected = one_of(stranger, &known);
             return Err(Error::invalid("subset", key, format!("`{stranger}`"), expected));

@@ -6,6 +6,7 @@ use crate::experiment::{
     Variant,
 };
 use skinsplat_data::Capture;
+use skinsplat_data::select::each_once;
 use skinsplat_fit::recipe::{Poses, Recipe};
 use skinsplat_metrics::{MetricId, ROTATION_JUMP_DEGREES};
 use std::collections::BTreeSet;
@@ -61,7 +62,7 @@ pub(super) fn ran_on(
     if let Some(average) = &experiment.average {
         sentences.push(format!("{}: each sequence counts once", average.label));
     }
-    sentences
+    each_once(sentences)
 }
 
 /// What was done to poses before training and scoring, a sentence each; nothing where they are as the data has them.
@@ -220,8 +221,10 @@ fn origin(source: &AvatarSource) -> String {
             let name = renders.folder.to_string_lossy().replace(char::is_control, "\u{fffd}");
             let time = renders.milliseconds.map_or(String::new(), |ms| format!(", {ms} ms per frame"));
             let size = renders.bytes.map_or(String::new(), |bytes| format!(", {bytes} bytes"));
+            let others = renders.left_over.as_ref().map_or(String::new(), |others| format!("; {others}"));
+            let others = others.replace(char::is_control, "\u{fffd}");
             format!(
-                "rendered by another program, the folder {name} ({}{size}{time})",
+                "rendered by another program, the folder {name} ({}{size}{time}{others})",
                 count(renders.frames.len(), "image")
             )
         }

@@ -103,16 +103,14 @@ mod tests {
     use super::*;
     use serde::Deserialize;
 
-    #[derive(Debug, Deserialize)]
+    #[derive(Debug, PartialEq, Deserialize)]
     #[serde(deny_unknown_fields)]
-    #[allow(dead_code, reason = "only read")]
     struct Outer {
         items: Vec<Inner>,
     }
 
-    #[derive(Debug, Deserialize)]
+    #[derive(Debug, PartialEq, Deserialize)]
     #[serde(deny_unknown_fields)]
-    #[allow(dead_code, reason = "only read")]
     struct Inner {
         name: String,
         value: f64,
@@ -145,6 +143,9 @@ mod tests {
         ] {
             assert_eq!(from_json::<Outer>(text, "a document").unwrap_err(), expected, "{text}");
         }
+        let whole = Outer { items: vec![Inner { name: "a".into(), value: 1.0, count: Some(3) }] };
+        let text = r#"{"items": [{"name": "a", "value": 1, "count": 3}]}"#;
+        assert_eq!(from_json::<Outer>(text, "a document"), Ok(whole));
         let error = from_json::<Outer>("{\"items\": [", "a document").unwrap_err();
         assert!(error.starts_with("no JSON: ") && error.ends_with("; expected a document"), "{error}");
     }

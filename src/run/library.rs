@@ -7,7 +7,7 @@ use crate::experiment::{
 };
 use rayon::prelude::*;
 use skinsplat_data::avatar::read_avatar;
-use skinsplat_data::select::evenly_spaced;
+use skinsplat_data::select::{each_once, evenly_spaced};
 use skinsplat_data::{FrameSource, Sequence, Subject};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -138,9 +138,12 @@ fn describe_subject(
 /// What a reader of numbers has to know of a subject: what its files say or lack, and what a quick look finds.
 pub fn subject_notes(subject: &Subject) -> Vec<String> {
     let mut notes = subject.notes.clone();
-    notes.extend(skinsplat_check::subject(subject).iter().map(|found| format!("check finds {}", found.kind)));
+    // Some findings are notes already.
+    let own =
+        skinsplat_check::subject(subject).into_iter().filter(|found| !subject.notes.contains(&found.detail));
+    notes.extend(own.map(|found| format!("check finds {}", found.kind)));
     notes.extend(subject.sequences().flat_map(misfits));
-    notes
+    each_once(notes)
 }
 
 /// Width and height of the largest image of a sequence.

@@ -2,12 +2,12 @@
 
 use super::Error;
 use super::drawable::Behind;
-use crate::experiment::RenderedFrames;
+use crate::experiment::{LeftOver, RenderedFrames};
 use serde::Deserialize;
 use skinsplat_core::scene::{Camera, Image, Mask};
 use skinsplat_data::avatar::file_digest;
 use skinsplat_data::{Error as DataError, Sequence, Truth, error, frames, listing};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// What a folder may say about its frames, in `renders.json`.
@@ -89,6 +89,7 @@ pub(super) fn describe(path: &Path, subject: &str, sequence: &Sequence) -> Resul
     let found = |name: &str| images.get(name).or_else(|| images.get(name.rsplit('/').next()?));
     let paired = sequence.frames.iter().filter_map(|f| Some((f.name.clone(), found(&f.name)?.clone())));
     let frames: BTreeMap<String, PathBuf> = paired.collect();
+    let left_over = left_over(&images, &frames);
     let digests: BTreeMap<&str, String> = frames
         .iter()
         .map(|(name, file)| Ok((name.as_str(), file_digest(file)?)))
@@ -96,7 +97,15 @@ pub(super) fn describe(path: &Path, subject: &str, sequence: &Sequence) -> Resul
     let digest = skinsplat_data::key::content_key(&serde_json::json!(digests));
     let Said { splats, bytes, milliseconds } = said(&folder)?;
     let (path, sequence) = (path.to_owned(), sequence.id.clone());
-    Ok(RenderedFrames { path, folder, sequence, frames, digest, splats, bytes, milliseconds })
+    Ok(RenderedFrames { path, folder, sequence, frames, left_over, digest, splats, bytes, milliseconds })
+}
+
+/// The images that no frame was paired with.
+fn left_over(images: &BTreeMap<String, PathBuf>, paired: &BTreeMap<String, PathBuf>) -> Option<LeftOver> {
+    let used: BTreeSet<&PathBuf> = paired.values().collect();
+    let mut others = images.iter().filter(|(_, file)| !used.contains(file)).map(|(name, _)| name);
+    let first = others.next()?.clone();
+    Some(LeftOver { count: 1 + others.count(), first })
 }
 
 /// Every image below a folder, by its name: the path without extension and without folders that only sort files.

@@ -105,10 +105,82 @@ fn arrays_that_nothing_reads_are_named() {
 fn parts_of_data_sets_are_listed() {
     let desk = Desk::new();
     let raw = data("small/layouts/peoplesnapshot-raw/ava");
-    has(&desk.ok(args!["inspect", raw.join("masks.hdf5")]), &["HDF5", "masks", "inspect FOLDER"]);
+    has(
+        &desk.ok(args!["inspect", raw.join("masks.hdf5")]),
+        &["HDF5", "masks", "0.0000 to 1.0000", "layout peoplesnapshot-raw: masks"],
+    );
     let ball = data("small/layouts/galabasketball/ball/model");
-    has(&desk.ok(args!["inspect", ball.join("weights.npy")]), &["array", "shape", "inspect FOLDER"]);
-    has(&desk.ok(args!["inspect", ball.join("mesh.txt")]), &["text", "lines", "inspect FOLDER"]);
+    has(
+        &desk.ok(args!["inspect", ball.join("weights.npy")]),
+        &["array", "shape", "layout galabasketball: weights"],
+    );
+    has(&desk.ok(args!["inspect", ball.join("mesh.txt")]), &["text", "lines", "layout galabasketball: mesh"]);
+    desk.put("strange.txt", "x");
+    has(&desk.ok(args!["inspect", "strange.txt"]), &["text", "inspect FOLDER"]);
+}
+
+/// Pickles and archives that only mean something in their data set: what they hold, who reads it, what is left.
+#[test]
+fn files_of_arrays_say_who_reads_them() {
+    let desk = Desk::new();
+    let inspect = |path: &str| desk.ok(args!["inspect", data("small/layouts").join(path)]);
+    has(
+        &inspect("peoplesnapshot-raw/someone/camera.pkl"),
+        &["pickled dictionary", "camera_f", "[2]", " to ", "layout peoplesnapshot-raw: camera"],
+    );
+    has(
+        &inspect("peoplesnapshot-raw/someone/consensus.pkl"),
+        &["v_personal", ", 3]", "layout peoplesnapshot-raw: clothed shape"],
+    );
+    has(
+        &inspect("peoplesnapshot-raw/someone/reconstructed_poses.hdf5"),
+        &["HDF5", "pose ", "betas ", "layout peoplesnapshot-raw: poses"],
+    );
+    has(&inspect("neuman/own/alignments.npy"), &["00000.png", "[4, 3]", "layout neuman: alignments"]);
+    has(
+        &inspect("neuman/own/smpl_output_optimized.pkl"),
+        &[".pose", ".betas", "72]", "layout neuman: poses"],
+    );
+    has(
+        &inspect("xhumans/00099/train/Take4/render/cameras.npz"),
+        &["npz archive", "extrinsic", "[5, 4, 4]", "layout xhumans: training cameras"],
+    );
+    has(
+        &inspect("xhumans/00099/train/Take4/SMPLX/mesh-f00014_smplx.pkl"),
+        &["body_pose", "layout xhumans: training poses", "not read", "betas"],
+    );
+    let numbers = [("camera_f", &[2][..], Values::F64(vec![1.0, f64::NAN]))];
+    npz(&desk.path("odd.npz"), &numbers);
+    has(&desk.ok(args!["inspect", "odd.npz"]), &["1.0000 to 1.0000, 1 NaN or infinite"]);
+}
+
+#[test]
+fn a_folder_of_data_sets_says_what_each_folder_is() {
+    let desk = Desk::new();
+    let text = desk.ok(args!["inspect", data("small/layouts")]);
+    has(&text, &["folder of data sets", "layout xhumans: 00099", "layout neuman: ava own"]);
+    has(&text, &["models               no layout that is known", "layout galabasketball: ball"]);
+    copy(&data("small/layouts/neuman/ava"), &desk.path("people/seattle"));
+    desk.put("people/notes/readme.txt", "x");
+    let text = desk.ok(args!["inspect", "people"]);
+    has(&text, &["folder of subjects", "seattle              subject, layout neuman"]);
+    has(&text, &["notes                no layout that is known"]);
+}
+
+/// What is found twice, once in each of several frames, is said once.
+#[test]
+fn a_note_is_said_once() {
+    let desk = Desk::new();
+    copy(&data("small/layouts/peoplesnapshot/ava"), &desk.path("data/ava"));
+    let bytes = std::fs::read(data("blender/models/anny_smpl24.npz")).unwrap();
+    desk.put("data/models/SMPL_NEUTRAL.npz", bytes);
+    for i in 0..8 {
+        // A map of two labels.
+        let labels: Vec<u8> = (0..64 * 64).map(|k| u8::from(k % 64 > 20) + u8::from(k % 64 > 40)).collect();
+        desk.put(&format!("data/ava/masks/mask_{i:04}.npy"), crate::files::npy(&[64, 64], &labels));
+    }
+    let text = desk.ok(args!["inspect", "data/ava"]);
+    assert_eq!(text.matches("check finds mask-range in train").count(), 1, "{text}");
 }
 
 /// A subject of which too little is there: `check` looks at the others, `plan` and a table that falls back say what is wrong with it, and

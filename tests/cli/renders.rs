@@ -91,6 +91,38 @@ fn gaps_and_wrong_sizes_are_named() {
     run(&desk, "none", &["--renders", "other=theirs/tiny"]).exits(2, "no such variant");
 }
 
+/// Images that are of no frame take no part, and that is said.
+#[test]
+fn images_of_no_frame_are_named() {
+    let desk = desk();
+    let run = |desk: &Desk| {
+        desk.run(args![
+            "run",
+            "small.toml",
+            "--data",
+            data("small"),
+            "--fit-iterations",
+            "2",
+            "--out",
+            "run",
+            "--renders",
+            "surface=theirs/tiny",
+            "--variant",
+            "surface"
+        ])
+    };
+    let answer = run(&desk).exits(0, "every image is of a frame");
+    assert!(!answer.err.contains("no frame"), "{answer:?}");
+    for name in ["image_9998.png", "image_9999.png"] {
+        std::fs::copy(desk.path("theirs/tiny/image_0001.png"), desk.path(&format!("theirs/tiny/{name}")))
+            .unwrap();
+    }
+    let answer = run(&desk).exits(0, "two are of none");
+    let said = "2 more images are of no frame, such as image_9998";
+    assert!(answer.err.contains(&format!("theirs/tiny: {said} of test_b")), "{answer:?}");
+    assert!(desk.read("run/tables.md").contains(said), "{}", desk.read("run/tables.md"));
+}
+
 /// What has no score has no picture, and a page says so.
 #[test]
 fn a_gap_leaves_the_page_and_its_pictures() {
@@ -157,5 +189,36 @@ fn half_a_data_set_gives_half_a_table() {
     assert!(listed.contains("available"), "{listed}");
     desk.put("datasets.toml", registry("[\"tiny\", \"gone\"]"));
     let listed = desk.ok(args!["list", "datasets", "--datasets", "datasets.toml"]);
-    assert!(listed.contains("not complete: no folder") && listed.contains("people/gone"), "{listed}");
+    assert!(listed.contains("not complete: 1 of 2 subjects; no folder"), "{listed}");
+    assert!(listed.contains("people/gone"), "{listed}");
+    desk.put("datasets.toml", registry("[\"tiny\", \"torn\"]"));
+    let listed = desk.ok(args!["list", "datasets", "--datasets", "datasets.toml"]);
+    assert!(listed.contains("not complete: 1 of 2 subjects; one cannot be loaded: "), "{listed}");
+    desk.put("datasets.toml", registry("[\"gone\"]"));
+    let listed = desk.ok(args!["list", "datasets", "--datasets", "datasets.toml"]);
+    assert!(listed.contains("not there: looked in"), "{listed}");
+    // Asked for by name it costs its row too, and ends the run where nothing else was asked for.
+    let asked = |subjects: &[&str], out: &str| {
+        desk.put("datasets.toml", registry("[\"tiny\", \"torn\"]"));
+        let mut all = args![
+            "-q",
+            "run",
+            "pair.toml",
+            "--datasets",
+            "datasets.toml",
+            "--variant",
+            "surface",
+            "--out",
+            out
+        ];
+        all.extend(subjects.iter().flat_map(|id| ["--subject", *id]).map(OsString::from));
+        desk.run(all)
+    };
+    asked(&["tiny", "torn"], "both").exits(3, "one of two subjects cannot be read");
+    assert!(desk.read("both/tables.md").contains("torn/test_b/transforms.json"));
+    asked(&["tiny"], "one").exits(0, "the other alone");
+    let answer = asked(&["torn"], "none");
+    assert_eq!(answer.code, Some(2));
+    assert!(answer.err.contains("`torn` cannot be loaded") && answer.err.lines().count() == 1, "{answer:?}");
+    assert!(!desk.path("none").exists());
 }

@@ -172,7 +172,7 @@ fn the_built_in_registry_looks_in_the_current_folder() {
     let text = listed(&desk);
     let line = |text: &str, id: &str| text.lines().find(|line| line.starts_with(id)).unwrap().to_owned();
     let place = desk.path("tests/data/blender/datasets/snapshot_ava");
-    let expected = format!("not available: looked in {}", place.display());
+    let expected = format!("not there: looked in {}", place.display());
     assert!(line(&text, "snapshot_ava ").ends_with(&expected), "{text}");
     assert!(line(&text, "synthetic ").ends_with("available"), "{text}");
     copy(&data("small/tiny"), &place);

@@ -1,6 +1,6 @@
 //! Derivatives against central differences.
 #![allow(dead_code, unreachable_pub, reason = "shared by tests")]
-#![allow(clippy::print_stdout, reason = "tests; the agreement is printed")]
+#![expect(clippy::print_stdout, reason = "tests; the agreement is printed")]
 
 use glam::Mat3;
 use skinsplat_core::scene::{OwnedPosed, PosedGradient};

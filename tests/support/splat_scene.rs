@@ -1,5 +1,5 @@
 //! Reads the rasterizer's benchmark scenes: binary little-endian 3DGS PLY of degree 3 and camera JSON.
-#![allow(unreachable_pub, clippy::unwrap_used, reason = "shared by tests and benchmarks")]
+#![expect(unreachable_pub, clippy::unwrap_used, reason = "shared by tests and benchmarks")]
 
 use glam::{DMat4, Vec3};
 use skinsplat_core::scene::{Camera, Gaussians};

@@ -4,8 +4,9 @@
 //! the masks are bent about the principal point: a point at distance r moves to `s r (1 + k r^2 / R^2)`, with R half the
 //! image's diagonal. A better overlap than any size s alone gives is a lens. Loose clothes and wrong focal lengths are sizes.
 
-use super::findings::mean;
-use super::{Finding, Kind, Seen, Shadows};
+use super::bodies::Pair;
+use super::findings::{Explained, mean};
+use super::{Finding, Kind, Shadows};
 use skinsplat_core::scene::Camera;
 use skinsplat_data::Sequence;
 use std::ops::Range;
@@ -22,7 +23,7 @@ const LENSES: [f64; 8] = [-0.16, -0.12, -0.08, -0.05, 0.05, 0.08, 0.12, 0.16];
 const SIZES: [f64; 9] = [0.84, 0.88, 0.92, 0.96, 1.0, 1.04, 1.08, 1.12, 1.16];
 
 /// A finding if masks fit better through a lens.
-pub(super) fn bent(sequence: &Sequence, both: &[(&Seen, &Shadows)]) -> Option<Finding> {
+pub(super) fn bent(sequence: &Sequence, both: &[Pair<'_>]) -> Option<Explained> {
     let step = both.len().div_ceil(MOST).max(1);
     let frames: Vec<Frame<'_>> =
         both.iter().step_by(step).map(|(seen, shadows)| Frame::new(shadows, &seen.camera)).collect();
@@ -41,7 +42,8 @@ pub(super) fn bent(sequence: &Sequence, both: &[(&Seen, &Shadows)]) -> Option<Fi
     let detail = format!(
         "body and masks overlap by {fit:.2} for {plain:.2} through a lens that moves corners by {percent:.0} %: {what}?"
     );
-    Some(Finding::new(Kind::Camera, &sequence.id, detail))
+    let finding = Finding::new(Kind::Camera, &sequence.id, detail);
+    Some(Explained { gain: fit - overlap(0.0, 1.0)?, finding })
 }
 
 /// A frame, and where to look.

@@ -1,18 +1,25 @@
 #![doc = include_str!("../README.md")]
 
+mod bodies;
+mod edges;
 mod findings;
+mod genders;
 mod lens;
+mod masks;
 mod overlays;
+mod parts;
 mod shadows;
+mod timing;
 mod zoom;
 
+pub use genders::of_another_gender;
 pub use overlays::write as write_overlays;
 
 use rayon::prelude::*;
 use serde::Serialize;
 use shadows::Shadow;
 use skinsplat_core::scene::{Camera, Mask, PosedBody};
-use skinsplat_data::{Error, Sequence, ShapeFit, Subject};
+use skinsplat_data::{Doubt, Doubtful, Error, Sequence, ShapeFit, Subject};
 use skinsplat_render::mesh::{Mesh, SamplePattern, silhouette};
 
 /// Longer side at which silhouettes are compared, pixels.
@@ -76,21 +83,60 @@ impl Finding {
         Self { kind, sequence: sequence.to_owned(), detail: detail.into(), spoils: kind.spoils() }
     }
 
-    /// The finding behind a subject that cannot be loaded: no number can be made from it. What is not there, or is about
-    /// nothing in particular, is missing.
+    /// The finding behind a subject that cannot be loaded: no number can be made from it. Told by the field that the error is about, else
+    /// by the file; what is not there, or is about nothing in particular, is missing.
     pub fn of_error(error: &Error) -> Self {
-        let field = error.field();
-        let is = |words: &[&str]| words.iter().any(|word| field.contains(word));
-        let kind = match field {
-            _ if matches!(error, Error::Read { .. }) => Kind::MissingFrames,
-            _ if is(&["poses", "thetas", "body_pose", "global_orient", "transl"]) => Kind::PoseCount,
-            _ if is(&["betas", "shapedirs"]) => Kind::BetasSize,
-            _ if is(&["camera", "intrinsic", "extrinsic", "w2c"]) => Kind::Camera,
-            _ if is(&["gender", "model", "body", "weights", "v_template"]) => Kind::WrongGenderOrModel,
-            _ => Kind::MissingFrames,
-        };
-        Self { spoils: true, ..Self::new(kind, "", error.to_string()) }
+        let named =
+            |name: Option<&std::ffi::OsStr>| name.map_or(String::new(), |name| name.to_string_lossy().into());
+        let places = [error.field().to_owned(), named(error.path().file_name())];
+        let folder = named(error.path().parent().and_then(|folder| folder.file_name()));
+        let kind = places.iter().chain([&folder]).find_map(|name| kind_of(&name.to_lowercase()));
+        Self { spoils: true, ..Self::new(kind.unwrap_or(Kind::MissingFrames), "", error.to_string()) }
     }
+}
+
+/// What a field, a file or a folder of this name is about.
+fn kind_of(name: &str) -> Option<Kind> {
+    const WORDS: [(Kind, &[&str]); 5] = [
+        (Kind::BetasSize, &["betas", "shapedirs", "mean_shape"]),
+        (Kind::Camera, &["camera", "intrinsic", "extrinsic", "w2c", "focal"]),
+        (
+            Kind::PoseCount,
+            &[
+                "pose",
+                "theta",
+                "global_orient",
+                "trans",
+                "smpl_o",
+                "alignments",
+                "scale",
+                "expression",
+                "mesh-f",
+            ],
+        ),
+        (Kind::MissingFrames, &["image", "mask", "frame", "depth", "background", "video"]),
+        (
+            Kind::WrongGenderOrModel,
+            &[
+                "gender",
+                "model",
+                "body",
+                "weights",
+                "v_template",
+                "v_personal",
+                "consensus",
+                "regressor",
+                "rig",
+                "smpl_",
+                "smplx_",
+            ],
+        ),
+    ];
+    // X-Humans has its poses in a folder of this name.
+    let told = || {
+        WORDS.iter().find(|(_, words)| words.iter().any(|word| name.contains(word))).map(|(kind, _)| *kind)
+    };
+    if name == "smplx" { Some(Kind::PoseCount) } else { told() }
 }
 
 /// How well one frame fits.
@@ -136,9 +182,16 @@ struct Problem {
     text: String,
 }
 
-/// What a subject's own numbers say, before any frame is looked at: shapes that its body model cannot take. `sequence` of the
-/// findings is empty.
+/// What a subject's own files say, before any frame is looked at: shapes that its body model cannot take, lenses that distort, a body of
+/// another gender. `sequence` of the findings is empty.
 pub fn subject(subject: &Subject) -> Vec<Finding> {
+    let of_doubt = |Doubt { about, note }: &Doubt| {
+        let kind = match about {
+            Doubtful::Lens => Kind::Camera,
+            Doubtful::Gender => Kind::WrongGenderOrModel,
+        };
+        Finding { spoils: false, ..Finding::new(kind, "", note.clone()) }
+    };
     let cut = subject.shapes.iter().filter(|shape| shape.betas > shape.directions);
     let finding = |shape: &ShapeFit| {
         let ShapeFit { file, betas, directions } = shape;
@@ -148,7 +201,7 @@ pub fn subject(subject: &Subject) -> Vec<Finding> {
         );
         Finding::new(Kind::BetasSize, "", detail)
     };
-    cut.map(finding).collect()
+    cut.map(finding).chain(subject.doubts.iter().map(of_doubt)).collect()
 }
 
 /// Compares silhouettes and masks of some frames of a sequence, in their order, and names what is wrong.
@@ -163,7 +216,7 @@ pub fn sequence(sequence: &Sequence, frames: &[usize]) -> (SequenceFit, Vec<Find
     let overlaps: Vec<f64> = seen.iter().filter_map(overlap).collect();
     let mean_iou = (!overlaps.is_empty()).then(|| overlaps.iter().sum::<f64>() / overlaps.len() as f64);
     let fit = SequenceFit { id: sequence.id.clone(), frames: seen.iter().map(frame).collect(), mean_iou };
-    (fit, findings::of(sequence, &seen))
+    (fit, findings::of(sequence, &small, &seen))
 }
 
 fn look(small: &Sequence, index: usize) -> Seen {

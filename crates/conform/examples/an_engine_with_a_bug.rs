@@ -1,7 +1,7 @@
 //! An engine that forgets to turn SH, and what is said of it.
 //!
 //! `cargo run -p skinsplat-conform --example an_engine_with_a_bug`
-#![allow(clippy::print_stdout, reason = "an example")]
+#![expect(clippy::print_stdout, reason = "an example")]
 
 use serde_json::Value;
 use skinsplat_conform::{Cases, Convention, Options, check, export};

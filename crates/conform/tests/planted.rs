@@ -1,5 +1,5 @@
 //! Every bug is planted by an engine of the tests' own and has to be named, in JSON, in flat binary and in PLY; so are pairs.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, unreachable_pub, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, unreachable_pub, reason = "tests")]
 
 mod engine;
 

@@ -1,7 +1,7 @@
 //! The weighted average of rotations (Eq. 7) by several solvers, and spherical harmonics turned by it (Eq. 9).
 //!
 //! `cargo run -p skinsplat-core --example average_rotations`
-#![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example")]
+#![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "an example")]
 
 use skinsplat_core::math::average::{Solver, average};
 use skinsplat_core::math::rotation::{angle_between, conjugate, quaternion_to_matrix};

@@ -1,5 +1,5 @@
 #![doc = include_str!("../README.md")]
-#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+#![cfg_attr(test, expect(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 pub mod choice;
 pub mod math;

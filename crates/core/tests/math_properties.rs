@@ -1,5 +1,5 @@
 //! Properties of the maths layer that hold for every input: equivariance, invariances, identities between solvers.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 use proptest::prelude::*;
 use skinsplat_core::math::average::{self, Solver, Start, average, average_rotation, lanes};

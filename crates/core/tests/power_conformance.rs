@@ -1,6 +1,6 @@
 //! Power iteration and whole worked examples against reference values: `fixtures/power_iteration`, `fixtures/goldens`.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
-#![allow(clippy::print_stdout, reason = "reports the worst errors under --nocapture")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::print_stdout, reason = "reports the worst errors under --nocapture")]
 
 #[path = "../../../tests/support/mod.rs"]
 mod support;

@@ -1,7 +1,7 @@
 //! Rotation averaging and projections against reference values: `fixtures/rotation`. Every exact solver in both
 //! precisions; every case is counted.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
-#![allow(clippy::print_stdout, reason = "reports the worst errors under --nocapture")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::print_stdout, reason = "reports the worst errors under --nocapture")]
 
 #[path = "../../../tests/support/mod.rs"]
 mod support;

@@ -1,6 +1,5 @@
 //! Spherical harmonics against reference values: `fixtures/sh`, `fixtures/goldens`.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
-#![allow(clippy::print_stdout, reason = "reports the worst errors under --nocapture")]
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "../../../tests/support/mod.rs"]
 mod support;

@@ -1,7 +1,7 @@
 //! Named arrays, whichever container holds them: an `.npz` archive or a pickled dictionary.
 
 use super::error::disguise;
-use super::npy::Array;
+use super::npy::{self, Array};
 use super::npz::Archive;
 use super::pickle::{self, Pickle, Rows};
 use super::shapes::Extents;
@@ -23,7 +23,7 @@ enum Container {
 }
 
 impl Arrays {
-    /// Opens an `.npz` archive or a pickled dictionary, told apart by content. `what` says what the file is for.
+    /// Opens an `.npz` archive or a pickled dictionary (also one in an `.npy` file), told apart by content. `what` says what the file is for.
     ///
     /// # Errors
     /// A file that cannot be read or is neither; a pickle that names a class that is not read.
@@ -32,7 +32,8 @@ impl Arrays {
         let expected = "a .npz archive of arrays, or a pickled dictionary of them";
         let opened = source::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
         opened.map_err(|cause| Error::read(path, what, expected, cause))?;
-        let container = match pickle::is_pickle_file(path, &start) {
+        // NumPy saves a dictionary as an array of one pickled object.
+        let container = match pickle::is_pickle_file(path, &start) || start.starts_with(npy::MAGIC) {
             true => Container::Pickle(Pickle::read(path, what)?),
             false => {
                 if let Some(found) = disguise(&start).filter(|_| !start.starts_with(b"PK")) {
@@ -57,6 +58,14 @@ impl Arrays {
         match &self.container {
             Container::Archive(archive) => archive.names(),
             Container::Pickle(pickle) => pickle.root().keys().unwrap_or_default(),
+        }
+    }
+
+    /// The root of the dictionary, if the file is a pickle.
+    pub fn pickled(&self) -> Option<pickle::Field<'_>> {
+        match &self.container {
+            Container::Archive(_) => None,
+            Container::Pickle(pickle) => Some(pickle.root()),
         }
     }
 

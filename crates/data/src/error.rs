@@ -5,6 +5,9 @@ use skinsplat_core::scene::SceneError;
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// What the errors of a subject's files are about, in their fields.
+const SUBJECTS: [&str; 6] = ["poses", "betas", "camera", "body model", "mask", "image"];
+
 /// An error of the data layer. Every variant names the file, the field in it and what was expected, in one line.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -95,6 +98,33 @@ impl Error {
         Self::Write { path: path.into(), field: field.into(), expected, cause }
     }
 
+    /// The same error with a subject before its field ("camera line 3"), where the field alone does not say what it is about:
+    /// "line 3", "pickle", "width".
+    #[must_use]
+    pub(crate) fn about(mut self, subject: &str) -> Self {
+        let (Self::Read { field, .. } | Self::Write { field, .. } | Self::Invalid { field, .. }) = &mut self;
+        if SUBJECTS.iter().any(|known| field.contains(known)) {
+            return self;
+        }
+        // "pose[3]" of "poses".
+        let one = subject.strip_suffix('s').unwrap_or(subject);
+        *field = match field.strip_prefix(one).filter(|rest| rest.is_empty() || rest.starts_with('[')) {
+            Some(rest) => format!("{subject}{rest}"),
+            None => format!("{subject} {field}"),
+        };
+        self
+    }
+
+    /// The same error about a thing that is read as another: a mask is decoded as an image.
+    #[must_use]
+    pub(crate) fn renamed(mut self, from: &str, to: &str) -> Self {
+        let (Self::Read { field, .. } | Self::Write { field, .. } | Self::Invalid { field, .. }) = &mut self;
+        if let Some(rest) = field.strip_prefix(from) {
+            *field = format!("{to}{rest}");
+        }
+        self
+    }
+
     /// The file that the error is about.
     pub fn path(&self) -> &Path {
         match self {
@@ -149,4 +179,25 @@ pub fn read_json<T: serde::de::DeserializeOwned>(
 ) -> Result<T, Error> {
     let text = read_text(path, field, expected)?;
     serde_json::from_str(&text).map_err(|cause| Error::invalid(path, field, cause.to_string(), expected))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_says_what_it_is_about() {
+        let about = |field: &str, subject: &str| {
+            Error::invalid("x", field, "wrong", "right").about(subject).field().to_owned()
+        };
+        assert_eq!(about("line 3", "camera"), "camera line 3");
+        assert_eq!(about("cameras[2].K", "camera"), "cameras[2].K");
+        assert_eq!(about("pose[3]", "poses"), "poses[3]");
+        assert_eq!(about("pose", "poses"), "poses");
+        assert_eq!(about("body_pose", "poses"), "poses body_pose");
+        assert_eq!(about("betas[1]", "poses"), "betas[1]", "a shape is no pose");
+        assert_eq!(about("weights[9]", "body model"), "body model weights[9]");
+        let mask = Error::invalid("x", "image size", "wrong", "right").renamed("image", "mask");
+        assert_eq!(mask.field(), "mask size");
+    }
 }

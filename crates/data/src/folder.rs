@@ -10,7 +10,7 @@
 //! ```
 //! Sequences named `train*` are for fitting, those named `test*` for evaluation.
 
-use super::models::{Gender, Models, ShapeFit};
+use super::models::{Doubt, Gender, Models, ShapeFit};
 use super::poses::{self, PoseTrack};
 use super::{Capture, Error, Sequence, camera, error, listing};
 use super::{FrameFiles, FrameRef, FrameSource, MaskFile};
@@ -45,6 +45,8 @@ pub struct Subject {
     pub test: Vec<Sequence>,
     /// What was guessed, left out or not read, a sentence each.
     pub notes: Vec<String>,
+    /// What its own files say that may spoil its numbers.
+    pub doubts: Vec<Doubt>,
     /// Shapes that were asked of its body models.
     pub shapes: Vec<ShapeFit>,
 }
@@ -66,14 +68,16 @@ impl Subject {
         let joints = sequences().map(|s| s.body.skeleton.num_joints()).max();
         let capture = capture_of(folder, cameras.zip(joints))?;
         let id = listing::file_name(folder);
-        Ok(Self {
+        let subject = Self {
             id,
             capture,
             train,
             test,
             notes: models.notes().to_vec(),
-            shapes: models.shapes().to_vec(),
-        })
+            doubts: Vec::new(),
+            shapes: Vec::new(),
+        };
+        Ok(models.told(subject))
     }
 
     /// All sequences, training first.
@@ -186,11 +190,11 @@ impl Files {
     }
 
     fn cameras(&self) -> Result<Vec<Camera>, Error> {
-        camera::load(&self.or_listing("cameras.npz"))
+        camera::load(&self.or_listing("cameras.npz")).map_err(|e| e.about("camera"))
     }
 
     fn poses(&self) -> Result<PoseTrack, Error> {
-        poses::load(&self.or_listing("poses.npz"))
+        poses::load(&self.or_listing("poses.npz")).map_err(|e| e.about("poses"))
     }
 
     fn or_listing(&self, name: &str) -> PathBuf {
@@ -207,7 +211,7 @@ fn load_sequence(folder: &Path, id: &str, models: &mut Models) -> Result<Sequenc
     let cameras = files.cameras()?;
     let track = files.poses()?;
     let body = models.of_track(&files.or_listing("poses.npz"), transforms.model.as_deref(), &track)?;
-    let poses = track.poses(&body.skeleton)?;
+    let poses = track.poses(&body.skeleton).map_err(|e| e.about("poses"))?;
     let frames = frames_of(&files, transforms.frames, poses.len(), cameras.len())?;
     Ok(Sequence { id: id.to_owned(), body, poses, cameras: cameras.into(), frames, stored_sizes: None })
 }

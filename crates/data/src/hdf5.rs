@@ -4,6 +4,8 @@
 //! deflate, shuffle, fletcher32 and LZF. What is checked here first is that a file can hold what it declares, so that no
 //! count of a damaged file becomes memory.
 
+mod superblock;
+
 use super::npy::{Array, MAX_VALUES};
 use super::{Error, source};
 use hdf5_pure::{ChunkCacheConfig, DType, Dataset, File, FileAccessProperties, Layout};
@@ -34,9 +36,14 @@ impl Hdf5 {
     /// Opens a file. `what` says what it is for ("masks", "poses").
     ///
     /// # Errors
-    /// A file that cannot be read or is no HDF5 file.
+    /// A file that cannot be read, is no HDF5 file, or ends before it says.
     pub fn open(path: &Path, what: &str) -> Result<Self, Error> {
-        source::open(path).map_err(|cause| Error::read(path, what, "an HDF5 file", cause))?;
+        let unreadable = |cause| Error::read(path, what, "an HDF5 file", cause);
+        let opened = source::open(path).map_err(unreadable)?;
+        let length = opened.metadata().map_err(unreadable)?.len();
+        if let Some(fault) = superblock::cut_short(opened, length) {
+            return Err(Error::invalid(path, what, fault, "a whole HDF5 file: copy or download it again"));
+        }
         let cache = ChunkCacheConfig::default().with_max_bytes(CACHE);
         let properties = FileAccessProperties::new().with_chunk_cache(cache);
         let file = File::open_streaming_with_options(path, properties)

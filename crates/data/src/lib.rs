@@ -22,7 +22,7 @@
 //! | [`folder`] | a subject as a folder of sequences |
 //! | [`layouts`] | data sets as others store them: NeuMan, PeopleSnapshot, GalaBasketball, X-Humans |
 //! | [`sequence`] | posed frames with their cameras, decoded when asked for |
-#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+#![cfg_attr(test, expect(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 pub mod arrays;
 pub mod atomic;
@@ -32,6 +32,7 @@ pub mod camera;
 mod capture;
 pub mod depth;
 mod digest;
+pub mod entries;
 pub mod error;
 pub mod folder;
 pub mod frames;
@@ -64,6 +65,6 @@ pub use capture::Capture;
 pub use error::Error;
 pub use folder::Subject;
 pub use masks::{MaskFile, MaskReading};
-pub use models::{Gender, ShapeFit};
+pub use models::{Doubt, Doubtful, Gender, ShapeFit};
 pub use sequence::{FrameFiles, FrameGenerator, FrameRef, FrameSource, Sequence, Truth};
 pub use sourced::{SourceDigest, Sourced};

@@ -1,6 +1,6 @@
 //! The body models of a subject: which file it is, loaded once, and the shapes of it that sequences share.
 
-use super::folder::Options;
+use super::folder::{Options, Subject};
 use super::poses::PoseTrack;
 use super::{Error, body, listing, npy};
 use serde::{Deserialize, Serialize};
@@ -34,6 +34,9 @@ pub(crate) enum Family {
 }
 
 impl Gender {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Female, Self::Male, Self::Neutral];
+
     /// The gender of this name, in any case.
     pub(crate) fn named(name: &str) -> Option<Self> {
         match name.trim().to_ascii_lowercase().as_str() {
@@ -50,7 +53,8 @@ impl Gender {
         words.filter(|word| word.len() > 1).find_map(Self::named)
     }
 
-    fn word(self) -> &'static str {
+    /// What it is called, in one word.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Female => "female",
             Self::Male => "male",
@@ -62,7 +66,7 @@ impl Gender {
 impl Family {
     /// File names without extension, as the models are distributed.
     fn file_stems(self, gender: Gender) -> Vec<String> {
-        let word = gender.word();
+        let word = gender.name();
         let upper = word.to_ascii_uppercase();
         match self {
             Self::Smplx => vec![format!("SMPLX_{upper}")],
@@ -91,12 +95,31 @@ pub struct ShapeFit {
     pub directions: usize,
 }
 
+/// Something that a subject's own files say and that may spoil its numbers. It is among the subject's notes, too.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Doubt {
+    /// What it is about.
+    pub about: Doubtful,
+    /// The note.
+    pub note: String,
+}
+
+/// What a [`Doubt`] is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doubtful {
+    /// A lens that distorts.
+    Lens,
+    /// A body of another gender than the subject's.
+    Gender,
+}
+
 /// Body models that were loaded for a subject, and the shapes of them that its sequences share.
 pub(crate) struct Models<'a> {
     subject: &'a Path,
     options: &'a Options,
     loaded: BTreeMap<PathBuf, Model>,
     notes: Vec<String>,
+    doubts: Vec<Doubt>,
     shapes: Vec<ShapeFit>,
 }
 
@@ -108,7 +131,14 @@ struct Model {
 
 impl<'a> Models<'a> {
     pub(crate) fn new(subject: &'a Path, options: &'a Options) -> Self {
-        Self { subject, options, loaded: BTreeMap::new(), notes: Vec::new(), shapes: Vec::new() }
+        Self {
+            subject,
+            options,
+            loaded: BTreeMap::new(),
+            notes: Vec::new(),
+            doubts: Vec::new(),
+            shapes: Vec::new(),
+        }
     }
 
     /// What has to be said of the models and of the shapes that were asked for, each once and with its file.
@@ -116,9 +146,11 @@ impl<'a> Models<'a> {
         &self.notes
     }
 
-    /// The shapes that were asked for, each once.
-    pub(crate) fn shapes(&self) -> &[ShapeFit] {
-        &self.shapes
+    /// The subject with what is known of its models: shapes that were asked for, each once, and doubts.
+    pub(crate) fn told(self, mut subject: Subject) -> Subject {
+        subject.shapes.extend(self.shapes);
+        subject.doubts.extend(self.doubts);
+        subject
     }
 
     /// Adds what has to be said of a file.
@@ -154,6 +186,10 @@ impl<'a> Models<'a> {
         let body = self.posed(source, &path, track)?;
         if let Some(note) = self.other_gender(&path, gender) {
             self.note(&path, &note);
+            let doubt = Doubt { about: Doubtful::Gender, note: format!("{}: {note}", path.display()) };
+            if !self.doubts.contains(&doubt) {
+                self.doubts.push(doubt);
+            }
         }
         Ok(body)
     }
@@ -164,16 +200,16 @@ impl<'a> Models<'a> {
         let asked = self.options.gender;
         let given = self.options.model.as_deref().is_some_and(|model| model == path);
         let own = Gender::in_name(&listing::stem(path)).or(asked.filter(|_| !given))?;
-        let word = own.word();
+        let word = own.name();
         match asked {
             Some(asked) if asked != own => Some(format!(
                 "a {word} body, which the registry gives; the table asks for the {} one",
-                asked.word()
+                asked.name()
             )),
             Some(_) if own != subject => {
-                Some(format!("the {word} body, as the table asks; the subject is {}", subject.word()))
+                Some(format!("the {word} body, as the table asks; the subject is {}", subject.name()))
             }
-            None if own != subject => Some(format!("a {word} body; the subject is {}", subject.word())),
+            None if own != subject => Some(format!("a {word} body; the subject is {}", subject.name())),
             _ => None,
         }
     }
@@ -208,8 +244,8 @@ impl<'a> Models<'a> {
                 Some(model) => model.display().to_string(),
                 None => "models/ of the subject's folder or of one of the two above it".to_owned(),
             };
-            let problem = format!("no {} body", gender.word());
-            Error::invalid(source, "model", problem, format!("{}.npz or .pkl in {place}", stems[0]))
+            let problem = format!("no {} body", gender.name());
+            Error::invalid(source, "body model", problem, format!("{}.npz or .pkl in {place}", stems[0]))
         })
     }
 
@@ -221,7 +257,7 @@ impl<'a> Models<'a> {
         expression: &[f64],
     ) -> Result<Arc<RestBody>, Error> {
         if !self.loaded.contains_key(path) {
-            let body::Loaded { body, notes } = body::read(path)?;
+            let body::Loaded { body, notes } = body::read(path).map_err(|e| e.about("body model"))?;
             notes.iter().for_each(|note| self.note(path, note));
             self.loaded.insert(path.to_owned(), Model { body, shapes: Vec::new() });
         }
@@ -230,22 +266,24 @@ impl<'a> Models<'a> {
         if let Some((_, rest)) = shapes.iter().find(|(known, _)| *known == coefficients) {
             return Ok(rest.clone());
         }
+        let directions = body.shape.as_ref().map_or(0, |own| own.directions.len());
         let fit = ShapeFit {
             file: source.to_owned(),
             betas: betas.iter().rposition(|&beta| beta != 0.0).map_or(0, |last| last + 1),
-            directions: body.shape.as_ref().map_or(0, |own| own.directions.len()),
+            directions,
         };
         let (mut rest, notes) = body::shape(body, betas, expression).map_err(|e| Error::scene(source, e))?;
         let offsets = self.subject.join("gt_normal_offset.npy");
         if self.options.clothing && offsets.is_file() {
-            let array = npy::read(&offsets)?;
+            let of_body = |e: Error| e.about("body model");
+            let array = npy::read(&offsets).map_err(of_body)?;
             if let Some(i) = array.values.iter().position(|v| v.is_nan() || v.abs() > THICKEST) {
                 let problem = format!("{:e}", array.values[i]);
                 let expected = format!("metres of clothing, at most {THICKEST}");
-                return Err(Error::invalid(&offsets, format!("value {i}"), problem, expected));
+                return Err(Error::invalid(&offsets, format!("body model offsets[{i}]"), problem, expected));
             }
             let values: Vec<f32> = array.values.iter().map(|&v| v as f32).collect();
-            rest = rest.with_normal_offset(&values).map_err(|e| Error::scene(&offsets, e))?;
+            rest = rest.with_normal_offset(&values).map_err(|e| of_body(Error::scene(&offsets, e)))?;
         }
         let rest = Arc::new(rest);
         shapes.push((coefficients, rest.clone()));
@@ -253,6 +291,9 @@ impl<'a> Models<'a> {
             self.shapes.push(fit);
         }
         notes.iter().for_each(|note| self.note(source, note));
+        if betas.is_empty() && directions > 0 {
+            self.note(source, &format!("no betas, for a model of {directions} directions: the mean shape"));
+        }
         Ok(rest)
     }
 
@@ -264,13 +305,13 @@ impl<'a> Models<'a> {
             (None, _) => {}
         }
         let Some(name) = name else {
-            return Err(Error::invalid(source, "model", "missing", "a body model, named here or given"));
+            return Err(Error::invalid(source, "body model", "missing", "a body model, named here or given"));
         };
         let found = || self.places().iter().map(|place| place.join(name)).find(|path| path.is_file());
         let inside = super::listing::stays_inside(name, 0);
         inside.then(found).flatten().ok_or_else(|| {
             let expected = "a file in models/ of the subject's folder or of one of the two above it";
-            Error::invalid(source, "model", format!("{name} not found"), expected)
+            Error::invalid(source, "body model", format!("{name} not found"), expected)
         })
     }
 
@@ -322,7 +363,7 @@ mod tests {
         assert!(found.ends_with("SMPL_MALE.npz"), "{}", found.display());
         let error = models.path_of(&subject, Family::Smpl, Gender::Female).unwrap_err().to_string();
         assert!(
-            error.contains("model: no female body; expected SMPL_FEMALE.npz or .pkl in models/"),
+            error.contains("body model: no female body; expected SMPL_FEMALE.npz or .pkl in models/"),
             "{error}"
         );
     }

@@ -41,6 +41,16 @@ pub fn read(path: &Path) -> Result<Array, Error> {
     read_with_header(path).map(|(_, array)| array)
 }
 
+/// True if the array holds Python objects: a pickle, which [`Pickle`](crate::pickle::Pickle) reads.
+///
+/// # Errors
+/// A file that cannot be read or is not `.npy`.
+pub fn holds_objects(path: &Path) -> Result<bool, Error> {
+    let mut file = source::open(path).map_err(|cause| Error::read(path, "file", "a .npy array", cause))?;
+    let header = read_header(&mut file, "array").map_err(|e| Error::scene(path, e))?;
+    Ok(header.descr.contains('O'))
+}
+
 /// As [`read`], with what the header says: the type of the numbers as they are stored.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Which frames to keep.
+//! Which of many to keep: frames, sentences.
 
 /// At most `limit` of `items`, evenly spaced: the items are cut into `limit` equal stretches and the middle of each is
 /// taken, item `floor((2 i + 1) n / (2 limit))` for i = 0, 1, ... The choice depends on the count alone.
@@ -10,9 +10,25 @@ pub fn evenly_spaced<T: Copy>(items: &[T], limit: Option<usize>) -> Vec<T> {
     }
 }
 
+/// Every item where it is first met.
+pub fn each_once<T: PartialEq>(items: Vec<T>) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::with_capacity(items.len());
+    for item in items {
+        if !kept.contains(&item) {
+            kept.push(item);
+        }
+    }
+    kept
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_repeats_is_kept_where_it_is_first_met() {
+        assert_eq!(each_once(vec!["b", "a", "b", "c", "a"]), ["b", "a", "c"]);
+    }
 
     #[test]
     fn frames_are_thinned_from_the_middle_of_equal_stretches() {

@@ -265,11 +265,11 @@ impl Sequence {
 
 impl FrameFiles {
     fn truth(&self, size: (usize, usize)) -> Result<Truth, Error> {
-        let (rgb, own_alpha) = frames::load_image(&self.image)?;
+        let (rgb, own_alpha) = frames::load_image(&self.image).map_err(|e| e.about("image"))?;
         check_size(&self.image, "image", (rgb.width(), rgb.height()), size)?;
         let alpha = match &self.mask {
             Some(file) => {
-                let mask = file.load(&rgb)?;
+                let mask = file.load(&rgb).map_err(|e| e.about("mask"))?;
                 check_size(&file.path, "mask", (mask.width(), mask.height()), size)?;
                 mask
             }

@@ -1,6 +1,6 @@
 //! Posed bodies against the expected vertices that come with the data: `gt_lbs_check.npz` of each sequence (SMPL-style
 //! models) and `*_check.npz` of each glTF model. `SKINSPLAT_DATA=DIR` checks a further folder of the same layout.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "../../../tests/support/mod.rs"]
 mod support;

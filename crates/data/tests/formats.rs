@@ -1,5 +1,5 @@
 //! Readers and writers of the data layer: what the formats allow, and what is refused, by file and field.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "formats/arrays.rs"]
 mod arrays;

@@ -1,15 +1,19 @@
 //! Subjects in the layouts of other people, written by other people's libraries (tests/data/make/layouts.py): the same person
 //! through every layout, answers of NumPy where the person is made up, and what damaged folders say.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "layouts/bad_folders.rs"]
 mod bad_folders;
+#[path = "layouts/betas.rs"]
+mod betas;
 #[path = "layouts/made_up.rs"]
 mod made_up;
 #[path = "layouts/names.rs"]
 mod names;
 #[path = "../../../tests/support/mod.rs"]
 mod support;
+#[path = "../../../tests/support/files.rs"]
+mod support_files;
 
 use skinsplat_core::scene::PosedBody;
 use skinsplat_data::folder::Options;

@@ -1,5 +1,5 @@
 //! 3DGS PLY files: bit-exact round trips, the layout that viewers expect, errors by name.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use glam::Vec3;
 use proptest::prelude::*;

@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-#[allow(clippy::print_stdout, reason = "an example")]
+#[expect(clippy::print_stdout, reason = "an example")]
 fn report(when: &str, steps: &[Step]) {
     let mean = |value: fn(&Step) -> f64| steps.iter().map(value).sum::<f64>() / steps.len() as f64;
     let splats = steps.last().map_or(0, |step| step.splats);

@@ -94,7 +94,7 @@ fn error(poses: &[Pose], exact: &Sequence) -> f64 {
     angles.iter().sum::<f64>() / angles.len() as f64
 }
 
-#[allow(clippy::print_stdout, reason = "an example")]
+#[expect(clippy::print_stdout, reason = "an example")]
 fn report(line: &str) {
     println!("{line}");
 }

@@ -7,7 +7,7 @@
 //! texture for the body's own atlas. All three ask the same two questions: where is a point of the surface seen in each
 //! frame (`sighting`), and what explains best what was seen there (`gather`). Frames are loaded a few at a time, in
 //! order; within a frame every point is independent: the avatar has the same bits for any number of threads.
-#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+#![cfg_attr(test, expect(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 mod adam;
 pub mod clothing;

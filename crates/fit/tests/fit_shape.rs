@@ -1,5 +1,5 @@
 //! Shapes fitted to silhouettes: spheres that are larger, dented or bent with a joint, seen from a ring of cameras.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 use glam::{DVec3, Vec3};
 use skinsplat_core::scene::{Camera, Image, Mask, Pose, PosedBody, RestBody, Skeleton, SkinWeights};

@@ -1,5 +1,5 @@
 //! Content keys hold every number that an avatar depends on.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use serde_json::Value;
 use skinsplat_data::key::content_key;

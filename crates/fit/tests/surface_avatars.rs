@@ -1,5 +1,5 @@
 //! Avatars made directly from training frames: a sphere of known colours, seen from a ring of cameras.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 use glam::{DVec3, Vec3};
 use skinsplat_core::scene::{Avatar, Camera, Image, Pose, PosedBody, RestBody, Skeleton, SkinWeights, Uv};

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Without files it makes two images. LPIPS is computed with the feature `alex`.
-#![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example")]
+#![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "an example")]
 
 use skinsplat_core::scene::Image;
 use skinsplat_metrics::{FrameScore, MetricId, MetricsError, Protocol, Truth, Wanted};

@@ -2,7 +2,7 @@
 //!
 //! VGG-16's weights (59 MB) are not in the repository: its tests run if `REPRODUCE_LPIPS_WEIGHTS` names the file, and say
 //! so on standard error if not. Its layers are tested with made-up weights in any case.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/mod.rs"]
 mod support;

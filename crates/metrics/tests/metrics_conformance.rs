@@ -1,6 +1,6 @@
 //! Metrics against reference values that scikit-image, PyTorch (3DGS, torchmetrics) and piq computed, and against a
 //! direct evaluation of the definition.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/mod.rs"]
 mod support;

@@ -1,5 +1,5 @@
 //! The page in a browser: it loads without a complaint, sorts, slides by mouse and by keys, switches frames, prints, fits a phone.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "support/chromium.rs"]
 mod chromium;

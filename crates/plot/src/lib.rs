@@ -5,7 +5,7 @@
 //!
 //! [`Scatter`] shows cost against error on logarithmic axes with the points that nothing beats in both joined by a line;
 //! [`Lines`] shows named curves over a common x. Both are drawn by [`svg`] and [`png()`].
-#![allow(clippy::disallowed_methods, reason = "pictures: no number of a table")]
+#![expect(clippy::disallowed_methods, reason = "pictures: no number of a table")]
 
 mod canvas;
 mod labels;

@@ -2,7 +2,7 @@
 //! paper's average. Whoever computes one quaternion per Gaussian gets means, covariances and SH from the poser.
 //!
 //! `cargo run -p skinsplat-posing --example own_strategy`
-#![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example")]
+#![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "an example")]
 
 use glam::{DQuat, DVec3, Vec3};
 use skinsplat_core::math::rotation::angle_between;

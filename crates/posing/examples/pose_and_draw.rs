@@ -1,7 +1,7 @@
 //! A made-up avatar, posed under two strategies and drawn side by side into a picture (PPM).
 //!
 //! `cargo run -p skinsplat-posing --example pose_and_draw -- elbow.ppm`
-#![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example")]
+#![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "an example")]
 
 use glam::{DVec3, Vec3};
 use skinsplat_core::scene::{

@@ -1,6 +1,6 @@
 //! What avatars and motions need, and that no bound is ever exceeded: every bounded solver and projection against the
 //! exact average, in `f64` and as posed in `f32`, on random and on adverse rigs, weights and poses.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/rig.rs"]
 mod rig;

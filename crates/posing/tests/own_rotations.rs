@@ -1,5 +1,5 @@
 //! Rotations that somebody else has computed, in place of a strategy's.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/rig.rs"]
 mod rig;

@@ -1,5 +1,5 @@
 //! The adjoint of posing with respect to the pose against differences of posing itself, for every strategy.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/rig.rs"]
 mod rig;

@@ -1,5 +1,5 @@
 //! The derivative of LBS against differences of the posed surface, in f64.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/posing_gradients.rs"]
 mod posing_gradients;

@@ -1,6 +1,6 @@
 //! Strategies against reference values: Eq. 6-9 end to end with every wrong variant (`gs_math/skinned_end_to_end.json`),
 //! and the frames and blends of the stock methods (`goldens/goldens.json`).
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/mod.rs"]
 mod support;

@@ -1,5 +1,5 @@
 //! The adjoint of posing against differences of posing itself, for every strategy and every kind of parameter.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/posing_gradients.rs"]
 mod posing_gradients;

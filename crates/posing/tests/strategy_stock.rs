@@ -1,5 +1,5 @@
 //! The stock methods step by step, in f64 and without the library's kernels; and what is degenerate.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/rig.rs"]
 mod rig;

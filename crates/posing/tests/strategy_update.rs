@@ -1,5 +1,5 @@
 //! Avatars that take over changed parameters in place, and poses into memory of before.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/rig.rs"]
 mod rig;

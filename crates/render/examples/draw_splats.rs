@@ -1,7 +1,7 @@
 //! Draws a ring of coloured Gaussians around a triangle, and writes `splats.ppm`.
 //!
 //! `cargo run --example draw_splats [FILE.ppm]`
-#![allow(clippy::disallowed_methods, reason = "an example")]
+#![expect(clippy::disallowed_methods, reason = "an example")]
 
 use glam::{DVec3, Mat3, Quat, Vec3};
 use skinsplat_core::scene::{Camera, Image, OwnedPosed};

@@ -1,5 +1,5 @@
 //! The triangle rasterizer against analytic coverage, ray casting, and its own promises (watertight, deterministic).
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use proptest::prelude::*;

@@ -1,11 +1,6 @@
 //! The rasterizer's derivatives against those that the original 3DGS kernels computed, with respect to the parameters as
 //! a PLY file holds them.
-#![allow(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    clippy::print_stdout,
-    reason = "tests; the agreement is printed"
-)]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/splat_scene.rs"]
 mod splat_scene;

@@ -1,11 +1,6 @@
 //! The rasterizer's derivatives against central differences of the definition in f64, and properties that they share
 //! with the image: order, threads, vector widths.
-#![allow(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    clippy::print_stdout,
-    reason = "tests; the agreement is printed"
-)]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/differences.rs"]
 mod differences;

@@ -1,5 +1,5 @@
 //! The splatting rasterizer against images that the original 3DGS kernels computed, and against reference values in f64.
-#![allow(
+#![expect(
     clippy::unwrap_used,
     clippy::disallowed_methods,
     clippy::print_stdout,

@@ -1,5 +1,5 @@
 //! Properties of the splatting rasterizer: the definition in f64, order, threads, background, bad numbers, extremes.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/random_scene.rs"]
 mod random_scene;

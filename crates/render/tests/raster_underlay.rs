@@ -1,11 +1,6 @@
 //! Gaussians drawn over, among and behind a mesh: the definition in f64, occlusion by a mesh that the triangle rasterizer
 //! drew, derivatives, threads and vector widths.
-#![allow(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    clippy::print_stdout,
-    reason = "tests; the agreement is printed"
-)]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/differences.rs"]
 mod differences;

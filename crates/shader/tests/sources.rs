@@ -1,5 +1,4 @@
 //! The committed files, without a translator: the translations are of this source, and hold every entry point.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
 use sha2::{Digest, Sha256};
 use skinsplat_shader::{SKINNING, VIEW, entry_points};

@@ -6,7 +6,7 @@
 //! the rotation nearest to F, and the affine-invariant distance (the root of Σ log² of the generalised eigenvalues) between
 //! the covariance of a disc in the face, ten times as wide as thick, carried by the strategy and by F. Faces are weighted by
 //! their area at rest and grouped by the widest angle between joints with a weight above 0.05 in the middle of the face.
-#![allow(clippy::print_stdout, reason = "an example")]
+#![expect(clippy::print_stdout, reason = "an example")]
 
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use skinsplat_core::math::{portable, rotation};

@@ -1,5 +1,5 @@
 //! What is left out where it is not needed changes nothing that is claimed not to change.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/rig.rs"]
 mod rig;

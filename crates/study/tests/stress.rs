@@ -1,6 +1,6 @@
 //! What `stress` promises: exact solvers hold everywhere, no cell is NaN, the same bits on any number of threads; and the
 //! remedy for jumps.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../../tests/support/rig.rs"]
 mod rig;

@@ -18,7 +18,7 @@
 //! | monocular | `train`: a turn in front of the camera | `test_twist`, `test_bend` |
 //! | multiview | `train`: a drill among cameras | `test_novel_view` (training poses, other cameras), `test_twist`, `test_bend` |
 //! | hands | `train`: gestures of the upper body | `test_fingers` |
-#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+#![cfg_attr(test, expect(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
 mod atlas;
 mod cell;

@@ -1,5 +1,5 @@
 //! Synthetic subjects: their bodies, motions, images and parameters.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 use glam::DVec3;
 use proptest::prelude::*;

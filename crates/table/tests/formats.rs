@@ -1,5 +1,4 @@
 //! One table that has everything, in every format.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
 use proptest::prelude::*;
 use skinsplat_table::{

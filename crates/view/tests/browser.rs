@@ -1,6 +1,5 @@
 //! The page in a browser: it poses as `f64` does, plays, turns, compares, and shows no complaint.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
-#![allow(clippy::print_stdout, reason = "says how near pictures are")]
+#![expect(clippy::unwrap_used, clippy::disallowed_methods, reason = "tests")]
 
 #[path = "../../page/tests/support/chromium.rs"]
 mod chromium;

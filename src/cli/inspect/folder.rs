@@ -9,7 +9,7 @@ use skinsplat_core::scene::Camera;
 use skinsplat_data::avatar::read_avatar;
 use skinsplat_data::folder::{Options, is_subject};
 use skinsplat_data::layouts::{self, Contents, Request};
-use skinsplat_data::{FrameSource, Sequence, Subject, splatting_avatar};
+use skinsplat_data::{FrameSource, Sequence, Subject, listing, splatting_avatar};
 use std::path::{Path, PathBuf};
 
 /// Everything of a folder.
@@ -26,12 +26,7 @@ pub(super) fn text(path: &Path) -> Result<String> {
     }
     let inner = path.join("datasets");
     let parent = if inner.is_dir() { &inner } else { path };
-    let subjects = layouts::subjects(parent);
-    if !subjects.is_empty() {
-        let mut text = line("kind", "folder of subjects");
-        for (folder, contents) in subjects {
-            text += &subject_text(&folder, &contents)?;
-        }
+    if let Some(text) = folders_text(parent)? {
         return Ok(text);
     }
     if let Some(folder) = renders::look(path)? {
@@ -44,6 +39,53 @@ pub(super) fn text(path: &Path) -> Result<String> {
         path.display(),
         known.join(", ")
     )
+}
+
+/// A folder of subjects, or of data sets that are such folders: what each folder in it is, and everything of its subjects.
+fn folders_text(parent: &Path) -> Result<Option<String>> {
+    let folders = listing::folders(parent, "subjects")?;
+    let own = layouts::subjects(parent);
+    let inner: Vec<Vec<(PathBuf, Contents)>> =
+        folders.iter().map(|folder| layouts::subjects(folder)).collect();
+    if own.is_empty() && inner.iter().all(Vec::is_empty) {
+        return Ok(None);
+    }
+    let kind = if own.is_empty() { "folder of data sets" } else { "folder of subjects" };
+    let mut text = line("kind", kind);
+    for (folder, inner) in folders.iter().zip(&inner) {
+        let subject = own.iter().find(|(path, _)| path == folder).map(|(_, contents)| contents);
+        text += &line(&name_of(folder), folder_kind(subject, inner));
+    }
+    for (folder, contents) in &own {
+        text += &format!("{}\n", folder.display());
+        text += &subject_text(folder, contents)?;
+    }
+    Ok(Some(text))
+}
+
+/// What one of several folders is, in a line.
+fn folder_kind(subject: Option<&Contents>, inner: &[(PathBuf, Contents)]) -> String {
+    if let Some(contents) = subject {
+        let lacks = if contents.missing.is_empty() { "" } else { ", not complete" };
+        return format!("subject, layout {}{lacks}", contents.layout.id);
+    }
+    if inner.is_empty() {
+        return "no layout that is known".to_owned();
+    }
+    let of_layout = |id: &&str| {
+        let names: Vec<String> = (inner.iter().filter(|(_, contents)| contents.layout.id == *id))
+            .map(|(path, _)| name_of(path))
+            .collect();
+        format!("layout {id}: {}", names.join(" "))
+    };
+    let ids = layouts::LAYOUTS.iter().map(|layout| layout.id);
+    let used: Vec<&str> =
+        ids.filter(|id| inner.iter().any(|(_, contents)| contents.layout.id == *id)).collect();
+    format!("data set, {}", used.iter().map(of_layout).collect::<Vec<_>>().join("; "))
+}
+
+fn name_of(folder: &Path) -> String {
+    folder.file_name().unwrap_or_default().to_string_lossy().escape_debug().to_string()
 }
 
 /// A run of this program: its tables, if it is done, and its stores.

@@ -267,6 +267,12 @@ def euler(degrees):
     return about(1, y) @ about(0, x) @ about(2, z)
 
 
+def degrees(turn):
+    """The angles of which `euler` makes this rotation."""
+    x = np.arcsin(np.clip(-turn[1, 2], -1, 1))
+    return np.degrees([x, np.arctan2(turn[0, 2], turn[2, 2]), np.arctan2(turn[1, 0], turn[1, 1])])
+
+
 def affine(turn, shift):
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turn, shift
@@ -351,6 +357,59 @@ def gala(target, cameras=7, times=range(0, 8), side=40):
                 picture[near] = np.round(255 * colours[v])
             save(target / f"{c}/{t:04}.png", picture)
     np.savez(target / "expected.npz", vertices=np.stack(posed), pixels=pixels.astype(np.float32))
+
+
+def player(target, every=5):
+    """The clothed person of multiview_ben as a player: every fifth vertex of its body, six cameras and the third of them again."""
+    folder = BLENDER / "datasets/multiview_ben/train"
+    cameras, poses = np.load(folder / "cameras.npz"), np.load(folder / "poses.npz")
+    model = np.load(BLENDER / "models/anny_smpl24.npz")
+    # Unity's world is that of the others with z turned about.
+    flip = np.diag([1.0, 1.0, -1.0])
+    template = model["v_template"] + model["shapedirs"][..., :10] @ poses["betas"]
+    centres, parents = (model["J_regressor"] @ template) @ flip, model["kintree_table"][0].astype(np.int64)
+    parents[0] = -1
+    corners = template[model["f"].astype(int)]
+    around = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.zeros_like(template)
+    for corner in range(3):
+        np.add.at(normals, model["f"][:, corner], around)
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True) @ flip
+    # Three joints more, which nothing hangs on.
+    parents, centres = np.concatenate([parents, [15, 22, 23]]), np.concatenate([centres, centres[[15, 22, 23]]])
+    joints = len(parents)
+    weights = np.pad(model["weights"], ((0, 0), (0, joints - 24)))[::every].astype(np.float32)
+    weights /= weights.sum(1, keepdims=True)
+    offsets = np.array([centres[j] - (centres[parents[j]] if j else 0) for j in range(joints)])
+    mesh = []
+    for place, normal in zip((template @ flip)[::every], normals[::every]):
+        mesh += [line(np.round(place, 5)), line(np.round(normal, 3)), "0.5,0.5", "1,0,0,0", "0,0,0,0"]
+    text(target / "model/mesh.txt", mesh)
+    text(target / "model/tpose.txt", [row for j in range(joints) for row in (line(offsets[j]), "0,0,0", "1,1,1")])
+    text(target / "model/tpose_mat.txt", [line(affine(np.eye(3), -centre)) for centre in centres])
+    text(target / "model/jointParent.txt", [str(p) for p in parents])
+    np.save(target / "model/weights.npy", weights)
+
+    for t, thetas in enumerate(poses["thetas"].astype(float).reshape(-1, 24, 3)):
+        turns = [flip @ rotation(theta) @ flip for theta in thetas] + [np.eye(3)] * (joints - 24)
+        places = [centres[0] + flip @ poses["transl"][t]] + list(offsets[1:])
+        text(target / f"pose/{t:04}.txt", [row for j in range(joints) for row in (line(places[j]), line(degrees(turns[j])), "1,1,1")])
+    for c, source in enumerate([0, 1, 2, 3, 4, 5, 2]):
+        turn, shift = cameras["extrinsic"][source][:3, :3], cameras["extrinsic"][source][:3, 3]
+        # Unity cameras look along z with y up.
+        up = np.diag([1.0, -1.0, 1.0])
+        turn, shift = up @ turn @ flip, up @ shift
+        w, *xyz = quaternion(turn.T)
+        height = float(cameras["height"])
+        field = np.degrees(2 * np.arctan(height / 2 / cameras["intrinsic"][source][1, 1]))
+        text(target / f"camera/{c}.txt", [f"{field:.9g},{SIDE},{SIDE}", line(-turn.T @ shift), ",".join(f"{v:.9g}" for v in (*xyz, w)), "1,1,1"])
+        y, x = np.mgrid[0:SIDE, 0:SIDE]
+        wall = np.stack([20 + x, 130 + y, 40 + 4 * c + 0 * x], -1) / 255
+        save(target / f"bg/{c}.png", np.round(255 * wall).astype(np.uint8))
+        for t, path in enumerate(sorted((folder / f"cam{source:02}/images").glob("*.png"))):
+            rgba = np.asarray(Image.open(path).convert("RGBA").resize((SIDE, SIDE), Image.BOX), np.float64) / 255
+            alpha = rgba[..., 3:]
+            save(target / f"{c}/{t:04}.png", np.round(255 * (rgba[..., :3] * alpha + wall * (1 - alpha))).astype(np.uint8))
 
 
 def small_body(target, joints=24, per_joint=2):
@@ -447,6 +506,7 @@ def make(target):
     for name, recording in takes.items():
         as_folder(target / "folder/hands", recording, {name: range(len(recording))}, "anny_smplx55.npz")
     gala(target / "galabasketball/ball")
+    player(target / "galabasketball/ben")
 
 
 def files(folder):

@@ -2,6 +2,7 @@
 
 mod shape;
 mod smpl;
+mod winding;
 
 pub use shape::shape;
 
@@ -46,13 +47,15 @@ pub struct Loaded {
 /// # Errors
 /// A file that is none of them, or whose content is not a consistent body; a pickle that names a class that is not read.
 pub fn read(path: &Path) -> Result<Loaded, Error> {
-    match Format::of(path)? {
-        Format::Npz | Format::Pickle => smpl::load(path),
+    let mut loaded = match Format::of(path)? {
+        Format::Npz | Format::Pickle => smpl::load(path)?,
         Format::Gltf => {
             let gltf::Rig { body, notes, .. } = gltf::Rig::load(path)?;
-            Ok(Loaded { body, notes })
+            Loaded { body, notes }
         }
-    }
+    };
+    loaded.notes.extend(winding::note(&loaded.body.rest).map_err(|e| Error::scene(path, e))?);
+    Ok(loaded)
 }
 
 /// The model of [`read`] alone.

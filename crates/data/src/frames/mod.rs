@@ -40,7 +40,9 @@ pub(super) fn image_from_bytes(path: &Path, bytes: &[u8]) -> Result<(Image, Opti
 pub fn load_mask(path: &Path) -> Result<Mask, Error> {
     let channels = match is_npy(path) {
         true => array::mask(path)?,
-        false => decode(path, &error::read_bytes(path, "mask", IMAGE)?)?,
+        false => {
+            decode(path, &error::read_bytes(path, "mask", IMAGE)?).map_err(|e| e.renamed("image", "mask"))?
+        }
     };
     let Channels { width, height, count, values, step } = channels;
     let coloured = |p: &[f32]| count >= 3 && (p[0] != p[1] || p[1] != p[2]);

@@ -88,7 +88,7 @@ impl Places {
                 let problem = "a matrix that shears or mirrors";
                 return Err(Error::invalid(
                     &self.path,
-                    format!("image {i}"),
+                    format!("poses alignments[{i}]"),
                     problem,
                     "a rotation with one scale",
                 ));

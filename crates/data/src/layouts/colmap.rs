@@ -35,7 +35,7 @@ const MODELS: [(&str, usize, usize); 5] = [
 /// # Errors
 /// Missing or malformed files, camera models that are not read, images of unknown cameras, two images of one name.
 pub(super) fn load(folder: &Path) -> Result<Vec<Registered>, Error> {
-    let cameras = cameras(&folder.join("cameras.txt"))?;
+    let cameras = cameras(&folder.join("cameras.txt")).map_err(|e| e.about("camera"))?;
     let path = folder.join("images.txt");
     let text = text(&path, "images")?;
     let mut images = Vec::new();
@@ -44,7 +44,7 @@ pub(super) fn load(folder: &Path) -> Result<Vec<Registered>, Error> {
         if line.trim().is_empty() {
             continue;
         }
-        images.push(image(&path, number + 1, line, &cameras)?);
+        images.push(image(&path, number + 1, line, &cameras).map_err(|e| e.about("image"))?);
         // The points of the image, unless a tool has dropped the empty line of an image without any.
         lines.next_if(|(_, line)| !is_image(line));
     }
@@ -206,14 +206,14 @@ mod tests {
     fn what_is_wrong_is_named_with_its_line() {
         let image = "1 1 0 0 0 0 0 0 1 a.png\n\n";
         for (cameras, images, field, word) in [
-            ("1 FISHEYE 64 48 1 2 3", image, "line 1", "FISHEYE"),
-            ("1 PINHOLE 64 48 50 51 30", image, "line 1", "6: width"),
-            ("1 PINHOLE 64 48 x 51 30 20", image, "line 1", "\"x\""),
-            ("1 PINHOLE 64 0 50 51 30 20", image, "line 1", "size"),
-            (CAMERAS, "1 1 0 0 0 0 0 0 2 a.png\n\n", "line 1", "camera 2"),
-            (CAMERAS, "1 0 0 0 0 0 0 0 1 a.png\n\n", "line 1", "length 0"),
-            (CAMERAS, "1 1 0 0 0 0 0 0 1 ../a.png\n\n", "line 1", "path"),
-            (CAMERAS, "1 1 0 0\n", "line 1", "4 words"),
+            ("1 FISHEYE 64 48 1 2 3", image, "camera line 1", "FISHEYE"),
+            ("1 PINHOLE 64 48 50 51 30", image, "camera line 1", "6: width"),
+            ("1 PINHOLE 64 48 x 51 30 20", image, "camera line 1", "\"x\""),
+            ("1 PINHOLE 64 0 50 51 30 20", image, "camera line 1", "size"),
+            (CAMERAS, "1 1 0 0 0 0 0 0 2 a.png\n\n", "image line 1", "camera 2"),
+            (CAMERAS, "1 0 0 0 0 0 0 0 1 a.png\n\n", "image line 1", "length 0"),
+            (CAMERAS, "1 1 0 0 0 0 0 0 1 ../a.png\n\n", "image line 1", "path"),
+            (CAMERAS, "1 1 0 0\n", "image line 1", "4 words"),
             (CAMERAS, "1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 0 0 0 1 a.png\n\n", "images", "twice"),
             (CAMERAS, "# nothing\n", "images", "none"),
         ] {

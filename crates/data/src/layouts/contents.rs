@@ -11,6 +11,8 @@ pub struct Part {
     pub what: &'static str,
     /// Where they lie, `*` standing for any text in a name: `masks/*.{npy,png}`.
     pub place: &'static str,
+    /// The arrays that are read of a file of arrays; empty if it is none, or all of it is read.
+    pub arrays: &'static [&'static str],
     /// Whether no subject can be read without it or an alternative.
     needed: bool,
     /// Whether no other layout has it, so that it tells the layout.
@@ -20,17 +22,22 @@ pub struct Part {
 impl Part {
     /// A part without which (or an alternative) nothing is read.
     pub(super) const fn needed(what: &'static str, place: &'static str) -> Self {
-        Self { what, place, needed: true, tells: false }
+        Self { what, place, arrays: &[], needed: true, tells: false }
     }
 
     /// A part that is used where it is.
     pub(super) const fn optional(what: &'static str, place: &'static str) -> Self {
-        Self { what, place, needed: false, tells: false }
+        Self { what, place, arrays: &[], needed: false, tells: false }
     }
 
     /// The same part, which no other layout has.
     pub(super) const fn telling(self) -> Self {
         Self { tells: true, ..self }
+    }
+
+    /// The same part, of whose files only these arrays are read.
+    pub(super) const fn of_arrays(self, arrays: &'static [&'static str]) -> Self {
+        Self { arrays, ..self }
     }
 
     /// Its files in a folder.
@@ -121,7 +128,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 /// True if a name is a pattern with one `*` in it, and perhaps `{a,b}` at its end.
-fn fits(name: &str, pattern: &str) -> bool {
+pub(super) fn fits(name: &str, pattern: &str) -> bool {
     if let Some((start, ends)) = pattern.split_once('{') {
         return ends.trim_end_matches('}').split(',').any(|end| fits(name, &format!("{start}{end}")));
     }

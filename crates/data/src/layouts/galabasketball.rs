@@ -66,9 +66,10 @@ const TEST_CAMERAS: [usize; 1] = [6];
 /// Missing or malformed files, several players, images without a pose of their number.
 fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let folder = request.folder;
-    let rig = Rig::load(&folder.join("model"))?;
-    let (times, poses) = poses(&folder.join("pose"), &rig)?;
-    let cameras: Sourced<Vec<Camera>> = cameras(&folder.join("camera"))?.into();
+    let rig = Rig::load(&folder.join("model")).map_err(|e| e.about("body model"))?;
+    let (times, poses) = poses(&folder.join("pose"), &rig).map_err(|e| e.about("poses"))?;
+    let cameras: Sourced<Vec<Camera>> =
+        cameras(&folder.join("camera")).map_err(|e| e.about("camera"))?.into();
     let images = TRAIN_CAMERAS
         .iter()
         .chain(&TEST_CAMERAS)
@@ -113,6 +114,15 @@ impl Rig {
                 "matrices",
                 problem,
                 format!("{joints}, one per joint of tpose.txt"),
+            ));
+        }
+        if let Some(j) = inverse_binds.iter().position(|bind| bind.matrix3.determinant() <= 0.0) {
+            let problem = format!("determinant {:.3}", inverse_binds[j].matrix3.determinant());
+            return Err(Error::invalid(
+                path,
+                format!("matrices[{j}]"),
+                problem,
+                "a rotation, perhaps with a scale: no joint mirrors or vanishes at rest",
             ));
         }
         let parents = parents(&folder.join("jointParent.txt"), joints)?;

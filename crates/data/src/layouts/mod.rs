@@ -7,6 +7,7 @@ mod distortion;
 mod galabasketball;
 mod neuman;
 mod peoplesnapshot;
+mod readers;
 mod snapshot_raw;
 mod split;
 mod surface;
@@ -15,6 +16,7 @@ mod video;
 mod xhumans;
 
 pub use contents::{Contents, Found, Part, contents, subjects};
+pub use readers::{Reader, readers};
 
 use super::folder::{Options, Subject};
 use super::{Capture, Error, FrameRef, Sequence, Sourced, listing};
@@ -89,7 +91,15 @@ impl Request<'_> {
         test: Vec<Sequence>,
         notes: Vec<String>,
     ) -> Subject {
-        Subject { id: listing::file_name(self.folder), capture, train, test, notes, shapes: Vec::new() }
+        Subject {
+            id: listing::file_name(self.folder),
+            capture,
+            train,
+            test,
+            notes,
+            doubts: Vec::new(),
+            shapes: Vec::new(),
+        }
     }
 }
 

@@ -22,7 +22,7 @@ use super::aligned;
 use super::colmap::{self, Registered};
 use super::{Layout, Part as Place, Request, Shared, split, triples};
 use crate::folder::Subject;
-use crate::models::{Family, Gender, Models};
+use crate::models::{Doubt, Doubtful, Family, Gender, Models};
 use crate::npz::Archive;
 use crate::poses::{Part, PoseTrack};
 use crate::{
@@ -40,8 +40,10 @@ pub(super) const LAYOUT: Layout = Layout {
         Place::needed("registered images", "sparse/images.txt").telling(),
         Place::needed("masks", "4d_humans/sam_segmentations/*.png").telling(),
         Place::needed("masks", "segmentations/*.{npy,png}").telling(),
-        Place::needed("poses", "4d_humans/smpl_optimized_aligned_scale.npz").telling(),
-        Place::needed("poses", "smpl_output_optimized.pkl").telling(),
+        Place::needed("poses", "4d_humans/smpl_optimized_aligned_scale.npz")
+            .of_arrays(&["betas", "global_orient", "body_pose", "transl", "scale"])
+            .telling(),
+        Place::needed("poses", "smpl_output_optimized.pkl").of_arrays(&["pose", "betas"]).telling(),
         Place::optional("alignments", "alignments.npy").telling(),
     ],
     load,
@@ -59,17 +61,21 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let (train, test) = parts(request, captures.len())?;
     let poses_path = folder.join("4d_humans/smpl_optimized_aligned_scale.npz");
     let by_hugs = poses_path.is_file();
+    let of_poses = |e: Error| e.about("poses");
     let mut bodies = match by_hugs {
-        true => optimized(&poses_path, captures.len())?,
-        false => aligned::load(folder, &captures)?,
-    };
+        true => optimized(&poses_path, captures.len()),
+        false => aligned::load(folder, &captures),
+    }
+    .map_err(of_poses)?;
     bodies.track.betas = betas_of(&bodies, train.first().copied().unwrap_or_default(), &mut notes);
     let mut models = Models::new(folder, request.options);
     let body = models.of_person(&bodies.path, Family::Smpl, Gender::Neutral, &bodies.track)?;
     notes.extend_from_slice(models.notes());
-    let poses = bodies.poses(&body)?;
+    let poses = bodies.poses(&body).map_err(of_poses)?;
     let cameras: Vec<Camera> = captures.iter().map(|c| camera(c, by_hugs)).collect();
-    notes.extend(camera_notes(&captures, by_hugs));
+    notes.extend(centring(&captures, by_hugs));
+    let doubts: Vec<Doubt> = left_out(&captures).into_iter().collect();
+    notes.extend(doubts.iter().map(|doubt| doubt.note.clone()));
     if !by_hugs {
         notes.push(
             "poses of smpl_output_optimized.pkl and alignments.npy: HUGS's 4d_humans is not here".into(),
@@ -79,8 +85,8 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let scene = Scene { folder, captures, masks, shared };
     let sequences = [("train", train), ("test", test)].map(|(id, frames)| vec![scene.sequence(id, &frames)]);
     let [train, test] = sequences;
-    let shapes = models.shapes().to_vec();
-    Ok(Subject { shapes, ..request.subject(Capture::Monocular, train, test, notes) })
+    let subject = request.subject(Capture::Monocular, train, test, notes);
+    Ok(models.told(Subject { doubts, ..subject }))
 }
 
 /// Shapes and poses of all frames.
@@ -144,7 +150,7 @@ fn captures(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Registered>, E
     {
         let problem = format!("{} sorts before {}", pair[0].name, pair[1].name);
         let expected = "numbers of one width, as 00009.png and 00010.png";
-        return Err(Error::invalid(sparse.join("images.txt"), "names", problem, expected));
+        return Err(Error::invalid(sparse.join("images.txt"), "image names", problem, expected));
     }
     let images = folder.join("images");
     let present = listing::files(&images, "images", &["png", "jpg", "jpeg"])?;
@@ -199,7 +205,14 @@ fn masks(folder: &Path, captures: &[Registered], notes: &mut Vec<String>) -> Res
 /// HUGS's poses.
 fn optimized(path: &Path, frames: usize) -> Result<Bodies, Error> {
     let mut archive = Archive::open(path, "poses")?;
-    let betas = archive.require("betas", "*,*")?;
+    let betas = match archive.header("betas")?.shape.len() {
+        1 => archive.require("betas", "*")?,
+        _ => archive.require("betas", "*,*")?,
+    };
+    let (rows, columns) = match betas.shape[..] {
+        [rows, columns] => (rows, columns),
+        _ => (1, betas.values.len()),
+    };
     let orient = archive.require("global_orient", "N,3")?;
     if orient.shape[0] != frames {
         let problem = format!("{} poses", orient.shape[0]);
@@ -213,14 +226,13 @@ fn optimized(path: &Path, frames: usize) -> Result<Bodies, Error> {
     let translations = triples(&archive.require("transl", "N,3")?.values);
     let pattern = if archive.header("scale")?.shape.len() == 2 { "N,1" } else { "N" };
     let scale = archive.require("scale", pattern)?;
-    let count = betas.shape[1].max(1);
-    if ![1, frames].contains(&betas.shape[0]) {
-        return Err(archive.invalid("betas", format!("{} rows", betas.shape[0]), format!("1 or {frames}")));
+    if ![1, frames].contains(&rows) {
+        return Err(archive.invalid("betas", format!("{rows} rows"), format!("1 or {frames}")));
     }
     let parts = vec![(Part::GlobalOrient, orient.values), (Part::BodyPose, body_pose.values)];
     Ok(Bodies {
         path: path.to_owned(),
-        betas: betas.values.chunks_exact(count).map(<[f64]>::to_vec).collect(),
+        betas: betas.values.chunks_exact(columns.max(1)).map(<[f64]>::to_vec).collect(),
         track: PoseTrack::from_parts(path, Vec::new(), parts, translations)?.with_scales(&scale.values)?,
         places: None,
     })
@@ -245,22 +257,23 @@ fn camera(capture: &Registered, centred: bool) -> Camera {
     Camera { cx, cy, ..camera }
 }
 
-fn camera_notes(captures: &[Registered], centred: bool) -> Vec<String> {
+/// What is said of principal points that are put into the centre.
+fn centring(captures: &[Registered], centred: bool) -> Option<String> {
     let off = |c: &Registered| {
         let (x, y) =
             (c.camera.cx - f64::from(c.camera.width) / 2.0, c.camera.cy - f64::from(c.camera.height) / 2.0);
         x.abs().max(y.abs())
     };
     let farthest = captures.iter().map(off).fold(0.0, f64::max);
-    let mut notes = Vec::new();
-    if centred && farthest > 0.01 {
-        notes
-            .push(format!("principal points are put into the centre, as by HUGS: {farthest:.2} pixels away"));
-    }
-    if captures.iter().any(|capture| capture.distorted) {
-        notes.push("the cameras' distortion is left out, as by NeuMan and HUGS".to_owned());
-    }
-    notes
+    (centred && farthest > 0.01)
+        .then(|| format!("principal points are put into the centre, as by HUGS: {farthest:.2} pixels away"))
+}
+
+/// What is said of distortion.
+fn left_out(captures: &[Registered]) -> Option<Doubt> {
+    let note = || "the cameras' distortion is left out, as by NeuMan and HUGS".to_owned();
+    let distorted = captures.iter().any(|capture| capture.distorted);
+    distorted.then(|| Doubt { about: Doubtful::Lens, note: note() })
 }
 
 /// Frames to train on and to test on.

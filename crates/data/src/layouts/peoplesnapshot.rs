@@ -53,8 +53,8 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let mut sequence = |id: &str| video.sequence(id, &splits.ranges(id), gender, &mut models);
     let (train, test) = (vec![sequence("train")?], vec![sequence("test")?]);
     notes.extend_from_slice(models.notes());
-    let shapes = models.shapes().to_vec();
-    Ok(Subject { shapes, ..request.subject(Capture::Monocular, train, test, notes) })
+    let subject = request.subject(Capture::Monocular, train, test, notes);
+    Ok(models.told(subject))
 }
 
 /// The subject's gender: as `config.json` says, else as its folder's name does; neutral with a note if neither does.
@@ -94,9 +94,9 @@ struct Video<'a> {
 impl<'a> Video<'a> {
     fn open(folder: &'a Path) -> Result<Self, Error> {
         let path = folder.join("cameras.npz");
-        let mut cameras = camera::load(&path)?;
+        let mut cameras = camera::load(&path).map_err(|e| e.about("camera"))?;
         let (Some(camera), true) = (cameras.pop(), cameras.is_empty()) else {
-            return Err(Error::invalid(path, "intrinsic", "several cameras", "one camera"));
+            return Err(Error::invalid(path, "camera intrinsic", "several cameras", "one camera"));
         };
         let images = Numbered::open(folder.join("images"), "images", &["png", "jpg", "jpeg"])?;
         let masks = Numbered::open(folder.join("masks"), "masks", &["npy", "png"])?;
@@ -119,7 +119,7 @@ impl<'a> Video<'a> {
         let frames = in_video(&self.images)?;
         self.masks.start_as(&self.images);
         let body = models.of_person(&path, Family::Smpl, gender, &track)?;
-        let poses = track.poses(&body.skeleton)?;
+        let poses = track.poses(&body.skeleton).map_err(|e| e.about("poses"))?;
         let frame = |(&frame, pose): (&usize, usize)| {
             let image = self.images.frame(frame)?.clone();
             let mask = Some(self.masks.frame(frame)?.clone().into());
@@ -137,12 +137,12 @@ impl<'a> Video<'a> {
         let refined = ["anim_nerf_", ""].map(|prefix| self.folder.join(format!("poses/{prefix}{id}.npz")));
         let [first, last, step] = ranges[0];
         if let Some(path) = refined.into_iter().find(|path| path.is_file()) {
-            let track = poses::load(&path)?;
+            let track = poses::load(&path).map_err(|e| e.about("poses"))?;
             let rows = refined_rows(&path, id, track.len(), ranges)?;
             return Ok((path, track, rows));
         }
         let path = self.folder.join("poses.npz");
-        let track = poses::load(&path)?;
+        let track = poses::load(&path).map_err(|e| e.about("poses"))?;
         self.images.fit_to(track.len(), &path, "poses")?;
         Ok((path, track, (first..=last).step_by(step).collect()))
     }

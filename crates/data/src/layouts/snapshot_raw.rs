@@ -23,7 +23,7 @@ use super::{Layout, Part as Place, Request, Shared, triples};
 use crate::digest::Fingerprint;
 use crate::folder::Subject;
 use crate::hdf5::{Hdf5, Rows};
-use crate::models::{Family, Gender, Models};
+use crate::models::{Doubt, Doubtful, Family, Gender, Models};
 use crate::pickle::Pickle;
 use crate::poses::{Part, PoseTrack};
 use crate::{
@@ -42,10 +42,12 @@ pub(super) const LAYOUT: Layout = Layout {
         Place::needed("frames", "frames/*.{png,jpg,jpeg}"),
         Place::needed("frames", "images/*.{png,jpg,jpeg}"),
         Place::optional("video", "*.{mp4,avi,mov}"),
-        Place::needed("masks", "masks.hdf5").telling(),
-        Place::needed("camera", "camera.pkl").telling(),
-        Place::needed("poses", "reconstructed_poses.hdf5").telling(),
-        Place::optional("clothed shape", "consensus.pkl").telling(),
+        Place::needed("masks", "masks.hdf5").of_arrays(&["masks"]).telling(),
+        Place::needed("camera", "camera.pkl")
+            .of_arrays(&["camera_f", "camera_c", "camera_k", "camera_rt", "camera_t", "width", "height"])
+            .telling(),
+        Place::needed("poses", "reconstructed_poses.hdf5").of_arrays(&["pose", "trans", "betas"]).telling(),
+        Place::optional("clothed shape", "consensus.pkl").of_arrays(&["v_personal", "betas"]).telling(),
     ],
     load,
 };
@@ -58,23 +60,24 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let folder = request.folder;
     let splits = Splits::of(request, None)?;
     let (gender, mut notes) = gender(folder, None)?;
-    let (camera, distortion) = camera(&folder.join("camera.pkl"))?;
-    let masks = masks(&folder.join("masks.hdf5"), &camera)?;
+    let (camera, distortion) = camera(&folder.join("camera.pkl")).map_err(|e| e.about("camera"))?;
+    let masks = masks(&folder.join("masks.hdf5"), &camera).map_err(|e| e.about("masks"))?;
     let count = masks.shape()[0];
     let mut images = extracted(folder)?;
     images.fit_within(count, masks.path(), "masks")?;
     let mut models = Models::new(folder, request.options);
     let (body, poses) = person(folder, count, gender, &mut models, &mut notes)?;
-    if !distortion.is_none() {
-        notes.push("frames and masks are undistorted with camera_k".to_owned());
-    }
+    let undone =
+        Doubt { about: Doubtful::Lens, note: "frames and masks are undistorted with camera_k".to_owned() };
+    let doubts: Vec<Doubt> = (!distortion.is_none()).then_some(undone).into_iter().collect();
+    notes.extend(doubts.iter().map(|doubt| doubt.note.clone()));
     notes.extend_from_slice(models.notes());
     let shared = Shared { body, poses, cameras: vec![camera.clone()].into() };
     let video = Video { folder, images, masks: Arc::new(masks), camera, distortion, shared };
     let sequence = |part: &str| Ok::<_, Error>(vec![video.sequence(part, splits.ranges(part)[0])?]);
     let (train, test) = (sequence("train")?, sequence("test")?);
-    let shapes = models.shapes().to_vec();
-    Ok(Subject { shapes, ..request.subject(Capture::Monocular, train, test, notes) })
+    let subject = request.subject(Capture::Monocular, train, test, notes);
+    Ok(models.told(Subject { doubts, ..subject }))
 }
 
 /// What both sequences are cut from.
@@ -126,16 +129,16 @@ impl FrameGenerator for RawFrame {
                 format!("camera.pkl's {width}x{height}"),
             ));
         }
+        let scene = |e| Error::scene(self.masks.path(), e).about("masks");
         let stored = self.masks.row(self.row)?;
         let highest = stored.iter().fold(0.0f64, |highest, &v| highest.max(v.abs()));
         // Bytes of 255 may be stored as -1.
         let covered = |&v: &f64| if highest > 1.0 { (v / 255.0) as f32 } else { v.abs() as f32 };
-        let scene = |e| Error::scene(self.masks.path(), e);
         let mask = Mask::new(width, height, stored.iter().map(covered).collect()).map_err(scene)?;
         if self.distortion.is_none() {
             return Ok(Truth::new(image, mask));
         }
-        let rgb = self.distortion.undone(&image).map_err(|e| Error::scene(&self.image, e))?;
+        let rgb = self.distortion.undone(&image).map_err(|e| Error::scene(&self.image, e).about("image"))?;
         Ok(Truth::new(rgb, self.distortion.undone_mask(&mask).map_err(scene)?))
     }
 
@@ -219,24 +222,30 @@ fn person(
     notes: &mut Vec<String>,
 ) -> Result<(Arc<RestBody>, Sourced<Vec<Pose>>), Error> {
     let path = folder.join("reconstructed_poses.hdf5");
-    let file = Hdf5::open(&path, "poses")?;
-    let (pose, trans) = (file.array("pose", &[0, 72])?, file.array("trans", &[0, 3])?);
-    for (field, found) in [("pose", pose.shape[0]), ("trans", trans.shape[0])] {
-        if found != count {
-            let expected = format!("{count}, one per mask of masks.hdf5");
-            return Err(Error::invalid(&path, field, format!("{found} rows"), expected));
-        }
-    }
-    let betas = file.array("betas", &[0])?.values;
-    let parts = vec![(Part::Whole, pose.values)];
-    let mut track = PoseTrack::from_parts(&path, betas, parts, triples(&trans.values))?;
+    let mut track = track(&path, count).map_err(|e| e.about("poses"))?;
     let consensus = folder.join("consensus.pkl");
     let body = match consensus.is_file() {
         false => models.of_person(&path, Family::Smpl, gender, &track)?,
         true => clothed(&consensus, &mut track, gender, models, notes)?,
     };
-    let poses = track.poses(&body.skeleton)?;
+    let poses = track.poses(&body.skeleton).map_err(|e| e.about("poses"))?;
     Ok((body, poses))
+}
+
+/// The poses of so many frames, and the shape beside them.
+fn track(path: &Path, count: usize) -> Result<PoseTrack, Error> {
+    let file = Hdf5::open(path, "poses")?;
+    let (pose, trans) = (file.array("pose", &[0, 72])?, file.array("trans", &[0, 3])?);
+    for (field, found) in [("pose", pose.shape[0]), ("trans", trans.shape[0])] {
+        if found != count {
+            let expected = format!("{count}, one per mask of masks.hdf5");
+            return Err(Error::invalid(path, field, format!("{found} rows"), expected));
+        }
+    }
+    let is_row = file.rows("betas")?.shape().len() == 2;
+    let betas = file.array("betas", if is_row { &[1, 0] } else { &[0] })?.values;
+    let parts = vec![(Part::Whole, pose.values)];
+    PoseTrack::from_parts(path, betas, parts, triples(&trans.values))
 }
 
 /// The shape of `consensus.pkl`.
@@ -247,8 +256,10 @@ fn clothed(
     models: &mut Models,
     notes: &mut Vec<String>,
 ) -> Result<Arc<RestBody>, Error> {
-    let pickle = Pickle::read(path, "consensus")?;
-    let own = pickle.get("betas")?.numbers("*")?.values;
+    let of_body = |e: Error| e.about("body model");
+    let pickle = Pickle::read(path, "consensus").map_err(of_body)?;
+    let own = pickle.get("betas")?;
+    let own = own.numbers("1,*").or_else(|_| own.numbers("*"))?.values;
     let far = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-5;
     if own.len() != track.betas.len() || own.iter().zip(&track.betas).any(far) {
         notes.push(
@@ -257,19 +268,19 @@ fn clothed(
         );
         track.betas = own;
     }
-    let offsets = pickle.get("v_personal")?.numbers("V,3")?;
+    let offsets = pickle.get("v_personal").and_then(|own| own.numbers("V,3")).map_err(of_body)?;
     let mut body = (*models.of_person(path, Family::Smpl, gender, track)?).clone();
     if offsets.shape[0] != body.vertices.len() {
         let problem = format!("{} offsets", offsets.shape[0]);
         return Err(Error::invalid(
             path,
-            "v_personal",
+            "body model v_personal",
             problem,
             format!("{}, one per vertex", body.vertices.len()),
         ));
     }
     body.vertices.iter_mut().zip(triples(&offsets.values)).for_each(|(vertex, offset)| *vertex += offset);
-    body.validate().map_err(|e| Error::scene(path, e))?;
+    body.validate().map_err(|e| of_body(Error::scene(path, e)))?;
     notes.push("the body has the clothing of consensus.pkl (v_personal)".to_owned());
     Ok(Arc::new(body))
 }

@@ -38,7 +38,7 @@ pub(super) fn affine(rows: &[f64]) -> DAffine3 {
 /// A camera: field of view in degrees from top to bottom, width, height; position; quaternion x y z w; scale.
 ///
 /// # Errors
-/// Other numbers of numbers, a field of view or size that is none, a scale of 0.
+/// Other numbers of numbers, a field of view or size that is none, a scale that mirrors or is 0.
 pub(super) fn camera(path: &Path) -> Result<Camera, Error> {
     let lines = numbers(path, "camera")?;
     let line = |i: usize, count: usize, what: &str| {
@@ -64,6 +64,10 @@ pub(super) fn camera(path: &Path) -> Result<Camera, Error> {
     let rotation = DQuat::from_xyzw(turn[0], turn[1], turn[2], turn[3]);
     if rotation.length() <= 1e-6 {
         return Err(Error::invalid(path, "line 3", "a quaternion of length 0", "x y z w"));
+    }
+    if scale.iter().product::<f64>() <= 0.0 {
+        let problem = format!("a scale of {}, {}, {}", scale[0], scale[1], scale[2]);
+        return Err(Error::invalid(path, "line 4", problem, "1, 1, 1: a camera that does not mirror"));
     }
     let rotation = mirrored(rotation.normalize());
     let world_from_camera =
@@ -182,6 +186,8 @@ mod tests {
             ("60,320,240\n0,0,0\n0,0,0,0\n1,1,1\n", "line 3"),
             ("60,320,240\n0,0,0\n0,0,0,1\n", "line 4"),
             ("200,320,240\n0,0,0\n0,0,0,1\n1,1,1\n", "line 1"),
+            ("60,320,240\n0,0,0\n0,0,0,1\n1,-1,1\n", "line 4"),
+            ("60,320,240\n0,0,0\n0,0,0,1\n1,0,1\n", "line 4"),
             ("60,0,240\n0,0,0\n0,0,0,1\n1,1,1\n", "width"),
         ] {
             std::fs::write(&path, text).unwrap();

@@ -47,12 +47,12 @@ pub(super) const LAYOUT: Layout = Layout {
         Place::needed("shape", "mean_shape_smplx.npy").telling(),
         Place::needed("training images", "train/*/render/image/*.{png,jpg,jpeg}").telling(),
         Place::needed("training depth", "train/*/render/depth/depth_*.tiff").telling(),
-        Place::needed("training cameras", "train/*/render/cameras.npz").telling(),
-        Place::needed("training poses", "train/*/SMPLX/mesh-f*_smplx.pkl").telling(),
+        Place::needed("training cameras", "train/*/render/cameras.npz").of_arrays(&CAMERA_ARRAYS).telling(),
+        Place::needed("training poses", "train/*/SMPLX/mesh-f*_smplx.pkl").of_arrays(&POSE_ARRAYS).telling(),
         Place::optional("test images", "test/*/render/image/*.{png,jpg,jpeg}").telling(),
         Place::optional("test depth", "test/*/render/depth/depth_*.tiff").telling(),
-        Place::optional("test cameras", "test/*/render/cameras.npz").telling(),
-        Place::optional("test poses", "test/*/SMPLX/mesh-f*_smplx.pkl").telling(),
+        Place::optional("test cameras", "test/*/render/cameras.npz").of_arrays(&CAMERA_ARRAYS).telling(),
+        Place::optional("test poses", "test/*/SMPLX/mesh-f*_smplx.pkl").of_arrays(&POSE_ARRAYS).telling(),
     ],
     load,
 };
@@ -71,6 +71,13 @@ const PARTS: [(&str, Part, usize); 7] = [
     ("right_hand_pose", Part::RightHand, 45),
 ];
 
+/// What is read of a take's cameras.
+const CAMERA_ARRAYS: [&str; 2] = ["intrinsic", "extrinsic"];
+
+/// What is read of a frame's pose: [`PARTS`] and where the body stands. Betas are the subject's.
+const POSE_ARRAYS: [&str; 9] =
+    [PARTS[0].0, PARTS[1].0, PARTS[2].0, PARTS[3].0, PARTS[4].0, PARTS[5].0, PARTS[6].0, "transl", "trans"];
+
 /// Loads every take of a subject.
 ///
 /// # Errors
@@ -83,7 +90,7 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
         let problem = name.trim().escape_debug().to_string();
         Error::invalid(&gender_path, "gender", format!("\"{problem}\""), "female, male or neutral")
     })?;
-    let betas = betas(&folder.join("mean_shape_smplx.npy"))?;
+    let betas = betas(&folder.join("mean_shape_smplx.npy")).map_err(|e| e.about("betas"))?;
     let mut person = Person {
         gender,
         betas,
@@ -106,8 +113,7 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     if person.expressive > 0 {
         notes.push(format!("expressions are left out ({} frames have one)", person.expressive));
     }
-    let shapes = person.models.shapes().to_vec();
-    Ok(Subject { shapes, ..request.subject(Capture::Hands, train, test, notes) })
+    Ok(person.models.told(request.subject(Capture::Hands, train, test, notes)))
 }
 
 fn betas(path: &Path) -> Result<Vec<f64>, Error> {
@@ -134,22 +140,28 @@ impl Person<'_> {
     fn take(&mut self, folder: &Path, id: String) -> Result<Sequence, Error> {
         let images = listing::numbered(&folder.join("render/image"), "images", &["png", "jpg", "jpeg"])?;
         let depths = Numbers::open(folder.join("render/depth"), "depth", &["tiff", "tif"])?;
-        let smplx = Numbers::open(folder.join("SMPLX"), "SMPLX", &["pkl"])?;
+        let smplx = Numbers::open(folder.join("SMPLX"), "poses", &["pkl"])?;
         let first = images.values().next().cloned().unwrap_or_default();
-        let [width, height] = image_size::of(&first)?;
+        let [width, height] = image_size::of(&first).map_err(|e| e.about("image"))?;
         let rows = Rows::middle(width, height);
-        let cameras = cameras(&folder.join("render/cameras.npz"), images.len(), width, rows)?;
+        let cameras = cameras(&folder.join("render/cameras.npz"), images.len(), width, rows);
+        // An image that is not there leaves one camera too many.
+        let cameras = cameras.map_err(|error| {
+            depths.without_image(folder, &images).unwrap_or_else(|| error.about("camera"))
+        })?;
         let (mut tracks, mut frames) = (Vec::new(), Vec::new());
         for (i, (&number, image)) in images.iter().enumerate() {
             let depth = depths.of(number, format!("depth_{number:06}.tiff"))?;
-            tracks.push(self.track(&smplx.of(number, format!("mesh-f{number:05}_smplx.pkl"))?)?);
+            let smplx = smplx.of(number, format!("mesh-f{number:05}_smplx.pkl"))?;
+            tracks.push(self.track(&smplx).map_err(|e| e.about("poses"))?);
             let made = RenderedFrame { image: image.clone(), depth, size: [width, height], rows };
             let source = FrameSource::Generated { generator: Arc::new(made), frame: 0 };
             frames.push(FrameRef { name: listing::stem(image), time: number, pose: i, camera: i, source });
         }
-        let track = PoseTrack::joined(&smplx.folder, tracks)?.with_hands(Hands::Mean);
+        let of_poses = |e: Error| e.about("poses");
+        let track = PoseTrack::joined(&smplx.folder, tracks).map_err(of_poses)?.with_hands(Hands::Mean);
         let body = self.models.of_person(&smplx.folder, Family::Smplx, self.gender, &track)?;
-        let poses = track.poses(&body.skeleton)?;
+        let poses = track.poses(&body.skeleton).map_err(of_poses)?;
         Ok(Sequence { id, body, poses, cameras: cameras.into(), frames, stored_sizes: None })
     }
 
@@ -207,6 +219,14 @@ impl Numbers {
     fn of(&self, number: usize, name: String) -> Result<PathBuf, Error> {
         let missing = || Error::invalid(&self.folder, self.field, format!("frame {number} is missing"), name);
         self.files.get(&number).cloned().ok_or_else(missing)
+    }
+
+    /// The first number that the images of a take lack.
+    fn without_image(&self, take: &Path, images: &BTreeMap<usize, PathBuf>) -> Option<Error> {
+        let number = self.files.keys().find(|number| !images.contains_key(number))?;
+        let expected = format!("color_{number:06}.png: {} has it", self.field);
+        let problem = format!("frame {number} is missing");
+        Some(Error::invalid(take.join("render/image"), "images", problem, expected))
     }
 }
 

@@ -83,6 +83,7 @@ fn representatives(folder: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn half_files_empty_files_and_missing_files_are_named() {
+    let mut untold = Vec::new();
     for kind in KINDS {
         let folder = tempfile::tempdir().unwrap();
         let subject = folder.path().join("subject");
@@ -102,13 +103,36 @@ fn half_files_empty_files_and_missing_files_are_named() {
                 }
                 let what = format!("{name}, {damage}");
                 match kind.read(&subject) {
-                    Err(error) => one_line(&error, &what),
+                    Err(error) => {
+                        one_line(&error, &what);
+                        let word = subject_of(&path).filter(|_| error.path() == path);
+                        untold.extend(
+                            word.filter(|word| !error.field().contains(word))
+                                .map(|word| format!("{what}, {word}: {error}")),
+                        );
+                    }
                     Ok(()) => assert!(may_pass(&path, damage), "{what}: taken without a word"),
                 }
             }
             std::fs::write(&path, &whole).unwrap();
         }
     }
+    assert!(untold.is_empty(), "fields that do not say what they are about: {untold:#?}");
+}
+
+/// The word by which the field of an error about a file tells what it is about.
+fn subject_of(path: &Path) -> Option<&'static str> {
+    const WORDS: [(&[&str], &str); 6] = [
+        (&["mean_shape"], "betas"),
+        (&["/camera/", "cameras.", "camera.pkl"], "camera"),
+        (&["/pose/", "/poses", "_poses", "/SMPLX/", "/smpl_", "alignments"], "poses"),
+        (&["/masks/", "masks.hdf5", "segmentations", "_mask"], "mask"),
+        (&["/model/"], "body model"),
+        (&["/images/", "/image/", "/frames/", "images.txt", "/0/"], "image"),
+    ];
+    let text = path.display().to_string();
+    let fits = |(parts, _): &&(&[&str], &str)| parts.iter().any(|part| text.contains(part));
+    WORDS.iter().find(fits).map(|(_, word)| *word)
 }
 
 /// What need not be there: `own` files of a layout that has others, and files that nobody reads.
@@ -191,19 +215,19 @@ fn neuman_names_what_does_not_match() {
             (
                 "unpadded names",
                 |f| replace(f.join("sparse/images.txt"), "00004.png", "4.png"),
-                "names",
+                "image names",
                 "numbers of one width",
             ),
             (
                 "a camera model",
                 |f| replace(f.join("sparse/cameras.txt"), "PINHOLE", "FOV"),
-                "line 4",
+                "camera line 4",
                 "camera model FOV",
             ),
             (
                 "an unknown camera",
                 |f| replace(f.join("sparse/images.txt"), " 3 00004.png", " 9 00004.png"),
-                "line 13",
+                "image line 13",
                 "camera 9",
             ),
             (
@@ -290,6 +314,16 @@ fn the_other_layouts_name_what_does_not_match() {
                 "frames",
                 "ffmpeg -i subject.mp4 -start_number 0 frames/%06d.png",
             ),
+            (
+                "masks that were cut off",
+                |f| {
+                    let path = f.join("masks.hdf5");
+                    let whole = std::fs::read(&path).unwrap();
+                    std::fs::write(path, &whole[..whole.len() - 100]).unwrap();
+                },
+                "masks",
+                "the file ends early, after ",
+            ),
             ("which is the first", |f| remove(f.join("images/frame_6.png")), "frames", "-start_number 0"),
         ],
     );
@@ -306,14 +340,14 @@ fn the_other_layouts_name_what_does_not_match() {
             (
                 "a pose",
                 |f| remove(f.join("train/Take4/SMPLX/mesh-f00014_smplx.pkl")),
-                "SMPLX",
+                "poses",
                 "mesh-f00014_smplx.pkl",
             ),
             (
                 "an image",
                 |f| remove(f.join("train/Take4/render/image/color_000011.png")),
-                "extrinsic",
-                "5 matrices; expected 4",
+                "images",
+                "frame 11 is missing; expected color_000011.png: depth has it",
             ),
             (
                 "no take",
@@ -339,16 +373,25 @@ fn the_other_layouts_name_what_does_not_match() {
                     let text = std::fs::read_to_string(&path).unwrap();
                     std::fs::write(path, text.repeat(2)).unwrap();
                 },
-                "pose",
+                "poses",
                 "2 players",
             ),
             (
                 "a parent",
                 |f| replace(f.join("model/jointParent.txt"), "-1\n0", "-1\n99"),
-                "line 2",
+                "body model line 2",
                 "a joint below 27",
             ),
-            ("a number", |f| replace(f.join("pose/0000.txt"), ",", ",x"), "line 1", "a number"),
+            (
+                "a mirrored joint",
+                |f| {
+                    let row = "0.871354992,0.0242893001,0.490051536";
+                    replace(f.join("model/tpose_mat.txt"), row, "-0.871354992,-0.0242893001,-0.490051536");
+                },
+                "body model matrices[0]",
+                "determinant -1.000",
+            ),
+            ("a number", |f| replace(f.join("pose/0000.txt"), ",", ",x"), "poses line 1", "a number"),
         ],
     );
 }

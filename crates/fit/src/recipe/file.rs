@@ -72,9 +72,10 @@ pub(super) fn parse(specification: &str) -> Result<Recipe, Error> {
         };
         let (path, value) =
             part.split_once('=').ok_or_else(|| refuse(format!("`{part}`"), expected(part, &table)))?;
-        let known = expected(path, &table);
-        let slot = slot(&mut table, path).ok_or_else(|| refuse(format!("no field `{path}`"), known))?;
-        *slot = value_of(value);
+        match slot(&mut table, path) {
+            Some(slot) => *slot = value_of(value),
+            None => return Err(refuse(format!("no field `{path}`"), expected(path, &table))),
+        }
         varied = true;
     }
     if varied {

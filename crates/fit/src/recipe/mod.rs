@@ -111,7 +111,6 @@ pub enum Poses {
 }
 
 impl Poses {
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
     fn are_given(&self) -> bool {
         *self == Self::Given
     }

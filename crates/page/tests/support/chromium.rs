@@ -52,7 +52,7 @@ fn messages(from: ChildStdout) -> Receiver<Value> {
 
 impl Chromium {
     /// Opens a file of this machine; none, with a word, where there is no Chromium.
-    #[allow(clippy::print_stderr, reason = "says why nothing was tested")]
+    #[expect(clippy::print_stderr, reason = "says why nothing was tested")]
     pub fn open(file: &Path, width: u32, height: u32, dark: bool) -> Option<Self> {
         let Some(name) = installed() else {
             eprintln!("skipped: no chromium here");
