@@ -136,7 +136,7 @@ fn files_of_arrays_say_who_reads_them() {
         &inspect("peoplesnapshot-raw/someone/reconstructed_poses.hdf5"),
         &["HDF5", "pose ", "betas ", "layout peoplesnapshot-raw: poses"],
     );
-    has(&inspect("neuman/own/alignments.npy"), &["00000.png", "[4, 3]", "layout neuman: alignments"]);
+    has(&inspect("neuman/own/alignments.npy"), &["00003.png", "[4, 3]", "layout neuman: alignments"]);
     has(
         &inspect("neuman/own/smpl_output_optimized.pkl"),
         &[".pose", ".betas", "72]", "layout neuman: poses"],

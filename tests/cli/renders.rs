@@ -186,7 +186,7 @@ fn half_a_data_set_gives_half_a_table() {
     assert_eq!(answer.code, Some(2));
     assert!(answer.err.contains("transforms.json"), "{answer:?}");
     let listed = desk.ok(args!["list", "datasets", "--datasets", "datasets.toml"]);
-    assert!(listed.contains("available"), "{listed}");
+    assert!(listed.contains("not complete: 0 of 1 subjects; one cannot be loaded"), "{listed}");
     desk.put("datasets.toml", registry("[\"tiny\", \"gone\"]"));
     let listed = desk.ok(args!["list", "datasets", "--datasets", "datasets.toml"]);
     assert!(listed.contains("not complete: 1 of 2 subjects; no folder"), "{listed}");
