@@ -98,7 +98,11 @@ impl Dataset {
             });
         }
         let folder = self.subject_folders().and_then(|folders| folders.into_iter().nth(place));
-        Ok(Subject { id: id.to_owned(), ..self.load_subject(&folder.ok_or_else(absent)?, options)? })
+        let folder = folder.ok_or_else(absent)?;
+        if !folder.is_dir() {
+            return Err(Error::invalid(folder, "subject", "no folder", format!("the folder of {id}")));
+        }
+        Ok(Subject { id: id.to_owned(), ..self.load_subject(&folder, options)? })
     }
 
     /// What the subjects of a synthetic dataset are made from: its parameters, or those that come with the program.

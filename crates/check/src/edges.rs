@@ -13,6 +13,8 @@ const SIZE: f64 = 0.035;
 const PIXELS: f64 = 2.5;
 /// A shift that is told apart, as a share of the image's longer side.
 const SHIFT: f64 = 0.02;
+/// The share of what an overlap lacks that a change must make good.
+const EXPLAINED: f64 = 0.4;
 
 /// Whether the person is elsewhere than the body, by the same way in every frame.
 pub(super) fn moved(sequence: &Sequence, pairs: &[Pair<'_>], whole: &[Edges]) -> Option<Explained> {
@@ -26,13 +28,14 @@ pub(super) fn moved(sequence: &Sequence, pairs: &[Pair<'_>], whole: &[Edges]) ->
         return None;
     }
     let detail = format!(
-        "the person is {:.1} % of the image to the side of the body and {:.1} % below it: principal point or translation",
-        100.0 * across / side,
-        100.0 * down / side
+        "the person is {:.1} % of the image to the {} of the body and {:.1} % {} it: principal point or translation",
+        100.0 * across.abs() / side,
+        if across < 0.0 { "left" } else { "right" },
+        100.0 * down.abs() / side,
+        if down < 0.0 { "above" } else { "below" }
     );
     let change = |_: &Seen, _: &Shadows| Some(Change { size: [1.0; 2], about: [0.0; 2], by: [across, down] });
-    let finding = Finding::new(Kind::Camera, &sequence.id, detail);
-    Some(Explained { gain: gain(pairs, change)?, finding })
+    explained(pairs, change, Finding::new(Kind::Camera, &sequence.id, detail))
 }
 
 /// Whether the person is larger than the body, and whose fault that is.
@@ -55,16 +58,24 @@ pub(super) fn sized(sequence: &Sequence, pairs: &[Pair<'_>], whole: &[Edges]) ->
     let change = |seen: &Seen, shadows: &Shadows| {
         Some(Change { size: [ratio; 2], about: about(seen, shadows)?, by: [0.0; 2] })
     };
-    Some(Explained { gain: gain(pairs, change)?, finding: Finding::new(kind, &sequence.id, detail) })
+    explained(pairs, change, Finding::new(kind, &sequence.id, detail))
 }
 
-/// What the overlap gains by a change, in the mean over frames.
-fn gain(pairs: &[Pair<'_>], change: impl Fn(&Seen, &Shadows) -> Option<Change>) -> Option<f64> {
-    let gains = pairs.iter().filter_map(|pair| {
+/// A finding if the change that it names makes a good part of what the overlap lacks: edges alone are moved by whatever hides a part of the
+/// person, too, and by masks that are too wide or too narrow.
+fn explained(
+    pairs: &[Pair<'_>],
+    change: impl Fn(&Seen, &Shadows) -> Option<Change>,
+    finding: Finding,
+) -> Option<Explained> {
+    let overlaps = pairs.iter().filter_map(|pair| {
         let changed = overlap(pair, &change(pair.0, pair.1)?)?;
-        Some(changed - pair.1.body.overlap(&pair.1.mask)?)
+        Some([pair.1.body.overlap(&pair.1.mask)?, changed])
     });
-    mean(gains)
+    let overlaps: Vec<[f64; 2]> = overlaps.collect();
+    let [given, changed] = [0, 1].map(|of| mean(overlaps.iter().map(|pair| pair[of])));
+    let (given, gain) = (given?, changed? - given?);
+    (gain > EXPLAINED * (1.0 - given)).then_some(Explained { gain, finding })
 }
 
 /// Whose fault a wrong size is, if edges can tell: of the point that it leaves in its place. That is the principal point if the focal

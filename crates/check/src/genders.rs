@@ -11,6 +11,8 @@ const MOST: usize = 12;
 const FEWEST: usize = 4;
 /// By how much the overlap must be better, in the mean over frames.
 const BETTER: f64 = 0.008;
+/// The same, where frames are few.
+const FAR_BETTER: f64 = 0.1;
 
 /// A finding where masks fit `other` better in four frames of five: the same sequence with the body of another `gender` in the place of
 /// its own. None if the bodies are the same.
@@ -31,7 +33,8 @@ pub fn of_another_gender([own, other]: [&Sequence; 2], gender: &str, frames: &[u
     let better = pairs.iter().filter(|[own, other]| other > own).count();
     let [own_fit, other_fit] = [0, 1].map(|of| findings::mean(pairs.iter().map(|pair| pair[of])));
     let (own_fit, other_fit) = (own_fit?, other_fit?);
-    if pairs.len() < FEWEST || 5 * better < 4 * pairs.len() || other_fit < own_fit + BETTER {
+    let enough = pairs.len() >= FEWEST || other_fit > own_fit + FAR_BETTER;
+    if !enough || 5 * better < 4 * pairs.len() || other_fit < own_fit + BETTER {
         return None;
     }
     let detail =

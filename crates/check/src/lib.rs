@@ -182,13 +182,14 @@ struct Problem {
     text: String,
 }
 
-/// What a subject's own files say, before any frame is looked at: shapes that its body model cannot take, lenses that distort, a body of
-/// another gender. `sequence` of the findings is empty.
+/// What a subject's own files say, before any frame is looked at: shapes that are larger or smaller than its body model's, cameras that
+/// were simplified, a body of another gender. `sequence` of the findings is empty.
 pub fn subject(subject: &Subject) -> Vec<Finding> {
     let of_doubt = |Doubt { about, note }: &Doubt| {
         let kind = match about {
-            Doubtful::Lens => Kind::Camera,
+            Doubtful::Camera => Kind::Camera,
             Doubtful::Gender => Kind::WrongGenderOrModel,
+            Doubtful::Betas => Kind::BetasSize,
         };
         Finding { spoils: false, ..Finding::new(kind, "", note.clone()) }
     };
@@ -226,12 +227,18 @@ fn look(small: &Sequence, index: usize) -> Seen {
 }
 
 fn shadows_of(small: &Sequence, index: usize, camera: &Camera) -> Result<Shadows, Problem> {
-    let unreadable = |text: String| {
-        let labels = text.contains("a map of labels");
-        Problem { kind: if labels { Kind::MaskRange } else { Kind::MissingFrames }, text }
-    };
-    let truth = small.truth(index).map_err(|error| unreadable(error.to_string()))?;
-    let (body, centres) = project(small, index, camera).map_err(|error| unreadable(error.to_string()))?;
+    let truth = small.truth(index).map_err(|error| {
+        let text = error.to_string();
+        let kind = match error.field() {
+            // Another size than the camera's.
+            "image size" => Kind::Camera,
+            _ if text.contains("a map of labels") => Kind::MaskRange,
+            _ => Kind::MissingFrames,
+        };
+        Problem { kind, text }
+    })?;
+    let (body, centres) = project(small, index, camera)
+        .map_err(|error| Problem { kind: Kind::PoseCount, text: error.to_string() })?;
     Ok(Shadows { mask: Shadow::of(&truth.alpha), body: Shadow::of(&body), centres })
 }
 

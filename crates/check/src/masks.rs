@@ -49,8 +49,8 @@ pub(super) fn dim(sequence: &Sequence, seen: &[Seen]) -> Option<Finding> {
         }
     }
     let (name, stored) = dim.first()?;
-    // A person of whom a camera sees no more than an edge has a dim mask.
-    if 2 * dim.len() < seen.len() {
+    // A person of whom a camera sees no more than an edge has a dim mask, but not one of 0 and 1.
+    if 2 * dim.len() < seen.len() && stored.largest != 1.0 {
         return None;
     }
     let read = if stored.largest == 1.0 { "read as 0 and 1" } else { "dim where the person is" };

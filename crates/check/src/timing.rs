@@ -26,6 +26,8 @@ const OF_THE_REST: f64 = 0.12;
 const OF_THE_REST_CHOSEN: f64 = 1.0 / 3.0;
 /// An overlap that leaves nothing to explain.
 const PERFECT: f64 = 0.95;
+/// Masks of one camera that overlap by more than this are of a person who stands still.
+const STILL: f64 = 0.97;
 /// Fewer frames decide nothing.
 const FEWEST: usize = 4;
 
@@ -64,7 +66,10 @@ impl<'a> Neighbours<'a> {
             let gains = near.into_iter().map(|(pose, overlap)| (pose as isize - own_pose, overlap - own));
             Some(Frame { pair, own, gains: gains.collect() })
         };
-        let frames = pairs.iter().zip(overlaps).filter_map(frame).collect();
+        let frames = match stands_still(bodies, &pairs) {
+            true => Vec::new(),
+            false => pairs.iter().zip(overlaps).filter_map(frame).collect(),
+        };
         Self { sequence, bodies, frames }
     }
 
@@ -224,6 +229,14 @@ impl<'a> Neighbours<'a> {
         let pose = self.bodies.pose_of(frame.pair.0).saturating_add_signed(shift);
         format!("{} has the pose of {}", self.name(frame), self.bodies.name_of_pose(pose))
     }
+}
+
+/// True if masks that a camera saw one after the other tell no order.
+fn stands_still(bodies: &Bodies<'_>, pairs: &[Pair<'_>]) -> bool {
+    let neighbours =
+        pairs.windows(2).filter(|pair| bodies.camera_of(pair[0].0) == bodies.camera_of(pair[1].0));
+    mean(neighbours.filter_map(|pair| pair[0].1.mask.overlap(&pair[1].1.mask)))
+        .is_some_and(|same| same > STILL)
 }
 
 /// A mask and the pose that fits it best.

@@ -64,7 +64,8 @@ pub(super) fn far_off(sequence: &Sequence, both: &[Pair<'_>], to_blame: Option<K
         }
         _ => far(fit).then(|| {
             let detail = format!(
-                "body and masks overlap by {fit:.2} for {given:.2} with about {zoom:.2} times the focal length: focal length"
+                "body and masks overlap by {fit:.2} for {given:.2} with about {zoom:.2} times the focal length: focal length, or \
+                 scale and translation"
             );
             Explained { gain: fit - given, finding: Finding::new(Kind::Camera, &sequence.id, detail) }
         }),
@@ -99,9 +100,13 @@ const DOUBTFUL: f64 = 0.7;
 /// A finding where body and masks do not meet, or barely, whatever the reason.
 pub(super) fn unexplained(sequence: &Sequence, both: &[Pair<'_>]) -> Option<Finding> {
     let given = mean(both.iter().filter_map(|(_, s)| s.body.overlap(&s.mask)))?;
+    let tried = match both.len() {
+        0..4 => "so few frames tell no more",
+        _ => "no shift, order, size or lens that was tried explains it",
+    };
     let detail = format!(
-        "body and masks overlap by {given:.2} only, and no shift, order, size or lens that was tried explains it: poses, translation, \
-         scale, model or masks of another person or convention"
+        "body and masks overlap by {given:.2} only, and {tried}: poses, translation, scale, model or masks of another person or \
+         convention"
     );
     let finding =
         Finding { spoils: given < FITS, ..Finding::new(Kind::WrongGenderOrModel, &sequence.id, detail) };

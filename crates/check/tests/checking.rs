@@ -269,6 +269,64 @@ fn poses_of_an_estimator_are_no_damage() {
     }
 }
 
+/// Masks whose outline is moved by so many pixels, outwards if `wider`.
+fn with_edges(sequence: &Sequence, wider: bool, pixels: isize) -> Sequence {
+    with_masks(sequence, |_, mask| {
+        let (width, height) = (mask.width() as isize, mask.height() as isize);
+        let covered = |x: isize, y: isize| {
+            let inside = (0..width).contains(&x) && (0..height).contains(&y);
+            inside && mask.at(x as usize, y as usize) >= 0.5
+        };
+        let value = |x: isize, y: isize| {
+            let mut around = (-pixels..=pixels).flat_map(|v| (-pixels..=pixels).map(move |u| (x + u, y + v)));
+            f32::from(if wider {
+                around.any(|(x, y)| covered(x, y))
+            } else {
+                around.all(|(x, y)| covered(x, y))
+            })
+        };
+        let values = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| value(x, y));
+        Mask::new(mask.width(), mask.height(), values.collect()).unwrap()
+    })
+}
+
+#[test]
+fn what_segmentations_get_wrong_is_no_damage() {
+    for subject in ["snapshot_ava", "xhands_ava"] {
+        let sequence = original(subject);
+        let spoilt = |sequence: &Sequence, what: &str| {
+            let (fit, findings) = checked(sequence);
+            let spoilt = findings.iter().any(|finding| finding.spoils);
+            assert!(!spoilt, "{subject}, {what}, {:?}: {findings:?}", fit.mean_iou);
+        };
+        spoilt(&with_edges(&sequence, true, 2), "wider");
+        spoilt(&with_edges(&sequence, false, 1), "narrower");
+        // Something stands before the lowest part of the person.
+        let hidden = with_masks(&sequence, |_, mask| {
+            let row = |y: usize| (0..mask.width()).any(|x| mask.at(x, y) >= 0.5);
+            let rows: Vec<usize> = (0..mask.height()).filter(|&y| row(y)).collect();
+            let last = rows[rows.len() * 4 / 5] * mask.width();
+            let values = mask.values().iter().enumerate().map(|(i, &v)| if i < last { v } else { 0.0 });
+            Mask::new(mask.width(), mask.height(), values.collect()).unwrap()
+        });
+        spoilt(&hidden, "hidden below");
+    }
+}
+
+#[test]
+fn who_stands_still_has_no_order() {
+    let sequence = original("snapshot_ava");
+    let truth = sequence.truth(0).unwrap();
+    let still = with_truths(&sequence, |_, _| Some(truth.clone()));
+    let pose = &sequence.poses[sequence.frames[0].pose];
+    let poses = vec![pose.clone(); sequence.poses.len()];
+    let still = Sequence { poses: poses.into(), ..still };
+    for seed in 0..4 {
+        let (_, findings) = checked(&still.with_pose_noise(2.0, seed));
+        assert!(findings.iter().all(|f| f.kind != Kind::FrameOffset && !f.spoils), "{seed}: {findings:?}");
+    }
+}
+
 /// A mask as a lens shows it: what a pinhole sees at distance r from the centre is at r (1 + k r^2 / R^2), R half the diagonal.
 fn distorted(mask: &Mask, k: f64) -> Mask {
     let (width, height) = (mask.width() as f64, mask.height() as f64);

@@ -11,6 +11,8 @@ use std::sync::Arc;
 
 /// No clothing is farther from the body, metres.
 const THICKEST: f64 = 0.5;
+/// Shapes are estimated in at least so many directions.
+const FEWEST_BETAS: usize = 10;
 
 /// Which of the bodies of a family a subject has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -107,10 +109,12 @@ pub struct Doubt {
 /// What a [`Doubt`] is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doubtful {
-    /// A lens that distorts.
-    Lens,
+    /// A lens that distorts, or a principal point that was moved.
+    Camera,
     /// A body of another gender than the subject's.
     Gender,
+    /// Fewer shape coefficients than any body has.
+    Betas,
 }
 
 /// Body models that were loaded for a subject, and the shapes of them that its sequences share.
@@ -153,6 +157,15 @@ impl<'a> Models<'a> {
         subject
     }
 
+    /// Adds what has to be said of a file and may spoil numbers.
+    fn doubt(&mut self, about: Doubtful, path: &Path, note: &str) {
+        self.note(path, note);
+        let doubt = Doubt { about, note: format!("{}: {note}", path.display()) };
+        if !self.doubts.contains(&doubt) {
+            self.doubts.push(doubt);
+        }
+    }
+
     /// Adds what has to be said of a file.
     pub(crate) fn note(&mut self, path: &Path, note: &str) {
         let note = format!("{}: {note}", path.display());
@@ -185,11 +198,7 @@ impl<'a> Models<'a> {
         let path = self.path_of(source, family, asked)?;
         let body = self.posed(source, &path, track)?;
         if let Some(note) = self.other_gender(&path, gender) {
-            self.note(&path, &note);
-            let doubt = Doubt { about: Doubtful::Gender, note: format!("{}: {note}", path.display()) };
-            if !self.doubts.contains(&doubt) {
-                self.doubts.push(doubt);
-            }
+            self.doubt(Doubtful::Gender, &path, &note);
         }
         Ok(body)
     }
@@ -290,9 +299,16 @@ impl<'a> Models<'a> {
         if !self.shapes.contains(&fit) {
             self.shapes.push(fit);
         }
-        notes.iter().for_each(|note| self.note(source, note));
+        let few = betas.len() < directions.min(FEWEST_BETAS);
+        for note in &notes {
+            match few && note.starts_with("betas") {
+                true => self.doubt(Doubtful::Betas, source, note),
+                false => self.note(source, note),
+            }
+        }
         if betas.is_empty() && directions > 0 {
-            self.note(source, &format!("no betas, for a model of {directions} directions: the mean shape"));
+            let note = format!("no betas, for a model of {directions} directions: the mean shape");
+            self.doubt(Doubtful::Betas, source, &note);
         }
         Ok(rest)
     }

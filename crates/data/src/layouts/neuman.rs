@@ -73,8 +73,7 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     notes.extend_from_slice(models.notes());
     let poses = bodies.poses(&body).map_err(of_poses)?;
     let cameras: Vec<Camera> = captures.iter().map(|c| camera(c, by_hugs)).collect();
-    notes.extend(centring(&captures, by_hugs));
-    let doubts: Vec<Doubt> = left_out(&captures).into_iter().collect();
+    let doubts: Vec<Doubt> = centring(&captures, by_hugs).into_iter().chain(left_out(&captures)).collect();
     notes.extend(doubts.iter().map(|doubt| doubt.note.clone()));
     if !by_hugs {
         notes.push(
@@ -258,22 +257,22 @@ fn camera(capture: &Registered, centred: bool) -> Camera {
 }
 
 /// What is said of principal points that are put into the centre.
-fn centring(captures: &[Registered], centred: bool) -> Option<String> {
+fn centring(captures: &[Registered], centred: bool) -> Option<Doubt> {
     let off = |c: &Registered| {
         let (x, y) =
             (c.camera.cx - f64::from(c.camera.width) / 2.0, c.camera.cy - f64::from(c.camera.height) / 2.0);
         x.abs().max(y.abs())
     };
     let farthest = captures.iter().map(off).fold(0.0, f64::max);
-    (centred && farthest > 0.01)
-        .then(|| format!("principal points are put into the centre, as by HUGS: {farthest:.2} pixels away"))
+    let note = format!("principal points are put into the centre, as by HUGS: {farthest:.2} pixels away");
+    (centred && farthest > 0.01).then_some(Doubt { about: Doubtful::Camera, note })
 }
 
 /// What is said of distortion.
 fn left_out(captures: &[Registered]) -> Option<Doubt> {
     let note = || "the cameras' distortion is left out, as by NeuMan and HUGS".to_owned();
     let distorted = captures.iter().any(|capture| capture.distorted);
-    distorted.then(|| Doubt { about: Doubtful::Lens, note: note() })
+    distorted.then(|| Doubt { about: Doubtful::Camera, note: note() })
 }
 
 /// Frames to train on and to test on.

@@ -68,7 +68,7 @@ fn load(request: &Request<'_>) -> Result<Subject, Error> {
     let mut models = Models::new(folder, request.options);
     let (body, poses) = person(folder, count, gender, &mut models, &mut notes)?;
     let undone =
-        Doubt { about: Doubtful::Lens, note: "frames and masks are undistorted with camera_k".to_owned() };
+        Doubt { about: Doubtful::Camera, note: "frames and masks are undistorted with camera_k".to_owned() };
     let doubts: Vec<Doubt> = (!distortion.is_none()).then_some(undone).into_iter().collect();
     notes.extend(doubts.iter().map(|doubt| doubt.note.clone()));
     notes.extend_from_slice(models.notes());
