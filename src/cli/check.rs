@@ -79,10 +79,10 @@ impl Check {
             let id = format!("{name}/{}", sequence.id);
             context.note(format!("{id}: {} frames", frames.len()));
             let (fit, findings) = check::sequence(sequence, &frames);
-            let gender = others.iter().find_map(|(gender, other)| {
-                let other = other.sequences().find(|other| other.id == sequence.id)?;
-                check::of_another_gender([sequence, other], gender.name(), &frames)
+            let same = others.iter().filter_map(|(gender, other)| {
+                Some((gender.name(), other.sequences().find(|other| other.id == sequence.id)?))
             });
+            let gender = check::of_another_gender(sequence, &same.collect::<Vec<_>>(), &frames);
             seen.sequences.push(SequenceFit { id: id.clone(), ..fit });
             let found = explained_by(gender, findings).into_iter();
             seen.findings.extend(found.map(|finding| Finding { sequence: id.clone(), ..finding }));

@@ -101,7 +101,8 @@ impl Data {
     pub(super) fn in_genders(&self, name: &str) -> Vec<(Gender, Subject)> {
         let Some((dataset, subject)) = name.split_once('/') else { return Vec::new() };
         let Ok(registry) = self.registry() else { return Vec::new() };
-        let dataset = registry.datasets.iter().find(|candidate| candidate.id == dataset);
+        let dataset =
+            registry.datasets.iter().find(|candidate| candidate.id == dataset && !candidate.is_generated());
         let load = |gender| {
             let options = Options { gender: Some(gender), ..self.options() };
             Some((gender, dataset?.load_one(subject, &options).ok()?))

@@ -14,9 +14,15 @@ const BETTER: f64 = 0.008;
 /// The same, where frames are few.
 const FAR_BETTER: f64 = 0.1;
 
-/// A finding where masks fit `other` better in four frames of five: the same sequence with the body of another `gender` in the place of
-/// its own. None if the bodies are the same.
-pub fn of_another_gender([own, other]: [&Sequence; 2], gender: &str, frames: &[usize]) -> Option<Finding> {
+/// A finding where masks fit one of the `others` better in four frames of five: the same sequence with the body of another gender, which
+/// is called so, in the place of its own. Of several the one that fits best.
+pub fn of_another_gender(own: &Sequence, others: &[(&str, &Sequence)], frames: &[usize]) -> Option<Finding> {
+    let found = others.iter().filter_map(|(gender, other)| fits_better([own, other], gender, frames));
+    found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, finding)| finding)
+}
+
+/// The overlap with the other body, and what is said of it. None if the bodies are the same.
+fn fits_better([own, other]: [&Sequence; 2], gender: &str, frames: &[usize]) -> Option<(f64, Finding)> {
     if own.body.vertices == other.body.vertices || own.frames.len() != other.frames.len() {
         return None;
     }
@@ -39,5 +45,5 @@ pub fn of_another_gender([own, other]: [&Sequence; 2], gender: &str, frames: &[u
     }
     let detail =
         format!("masks fit the {gender} body better than this one: overlap {other_fit:.3} for {own_fit:.3}");
-    Some(Finding::new(Kind::WrongGenderOrModel, &own.id, detail))
+    Some((other_fit, Finding::new(Kind::WrongGenderOrModel, &own.id, detail)))
 }
