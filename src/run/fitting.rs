@@ -292,7 +292,7 @@ fn start(
 }
 
 /// How checkpoint files begin; the SHA-256 of what follows it comes next.
-const CHECKPOINT: &[u8] = b"skinsplat checkpoint 3\n";
+const CHECKPOINT: &[u8] = b"skinsplat checkpoint 4\n";
 
 /// What a checkpoint file holds.
 #[derive(Debug, Default, Serialize, Deserialize)]

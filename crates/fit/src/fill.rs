@@ -32,7 +32,8 @@ impl Neighbours {
         Self::from_pairs(faces.len(), pairs)
     }
 
-    fn from_pairs(count: usize, mut pairs: Vec<(u32, u32)>) -> Self {
+    /// Of pairs in both directions; those with themselves and repetitions do not count.
+    pub(super) fn from_pairs(count: usize, mut pairs: Vec<(u32, u32)>) -> Self {
         pairs.retain(|(a, b)| a != b);
         pairs.sort_unstable();
         pairs.dedup();

@@ -175,6 +175,59 @@ impl Default for Schedule {
     }
 }
 
+/// How what has changed about a Gaussian since the start is drawn towards what has changed about those around it: per pair of neighbours
+/// the squared difference, over the number of Gaussians and of neighbours each, times a weight. What no frame shows follows what
+/// frames show, and what few frames show is not learnt by heart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Coupling {
+    /// So many are looked for around each Gaussian, among those whose normal at the start is less than 60 degrees off.
+    pub neighbours: u32,
+    /// Of displacements, per square metre; of face-bound Gaussians those along the normal.
+    pub position: f32,
+    /// Of log standard deviations.
+    pub scale: f32,
+    /// Of opacity logits.
+    pub opacity: f32,
+    /// Of SH coefficients of degree 0.
+    pub colour: f32,
+    /// Of the other SH coefficients.
+    pub colour_rest: f32,
+}
+
+impl Default for Coupling {
+    fn default() -> Self {
+        Self { neighbours: 6, position: 0.0, scale: 0.0, opacity: 0.0, colour: 0.0, colour_rest: 0.0 }
+    }
+}
+
+impl Coupling {
+    /// True for the values of [`Default`].
+    pub(crate) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// True if nothing is coupled.
+    pub(crate) fn is_off(&self) -> bool {
+        let Self { position, scale, opacity, colour, colour_rest, .. } = *self;
+        [position, scale, opacity, colour, colour_rest].iter().all(|&weight| weight == 0.0)
+    }
+
+    pub(crate) fn check(&self, section: &str) -> Result<(), Error> {
+        within(
+            section,
+            &[
+                ("neighbours", f64::from(self.neighbours), 1.0..=64.0),
+                ("position", f64::from(self.position), NOT_NEGATIVE),
+                ("scale", f64::from(self.scale), NOT_NEGATIVE),
+                ("opacity", f64::from(self.opacity), NOT_NEGATIVE),
+                ("colour", f64::from(self.colour), NOT_NEGATIVE),
+                ("colour_rest", f64::from(self.colour_rest), NOT_NEGATIVE),
+            ],
+        )
+    }
+}
+
 /// How the poses of training frames are fitted with the avatar (`poses = "refine"`): one state of Adam per pose, over a rotation
 /// vector per joint and the translation of the body.
 ///

@@ -202,6 +202,10 @@ impl AdjointChunk<'_, '_, '_> {
         }
         let values = upstream.chunks_exact(count).zip(gradient.sh.chunks_exact_mut(count));
         for (quat, (upstream, gradient)) in self.relative.iter().zip(values) {
+            // Most of the far side of a body is asked for nothing.
+            if upstream.as_flattened().iter().all(|&own| own == 0.0) {
+                continue;
+            }
             colour::rotate_sh_adjoint(*quat, degree, upstream, gradient);
         }
     }

@@ -64,6 +64,14 @@ pub(super) fn parse(specification: &str) -> Result<Recipe, Error> {
         |value: Result<Value, toml::ser::Error>| value.map_err(|e| refuse(e.to_string(), "a recipe".into()));
     table.entry("poses").or_insert(complete(Value::try_from(base.poses))?);
     table.entry("pose").or_insert(complete(Value::try_from(&base.pose))?);
+    table.entry("coupling").or_insert(complete(Value::try_from(&base.coupling))?);
+    for (section, field, value) in
+        [("rates", "decay", base.rates.decay), ("free", "scale_most", base.free.scale_most)]
+    {
+        if let Some(Value::Table(section)) = table.get_mut(section) {
+            section.entry(field).or_insert(Value::Float(value.into()));
+        }
+    }
     let mut varied = false;
     for part in parts {
         let expected = |path: &str, table: &Table| {
@@ -181,6 +189,11 @@ mod tests {
             "haha+mesh.gaussians_first=0.8+mesh.texture_next=0.3",
             "haha+mesh.gaussians_first=nan",
             "haha+start.surface=silhouettes",
+            "pure-skinned+rates.decay=0.0",
+            "pure-skinned+rates.decay=1.5",
+            "pure-skinned+free.scale_most=-1.0",
+            "pure-skinned+coupling.neighbours=0",
+            "pure-skinned+coupling.colour=nan",
             "haha+poses=guess",
             "haha+poses=refine+pose.decay=0.0",
             "haha+poses=refine+pose.most_degrees=200.0",

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// What is fitted. Colours always are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Free {
     /// How Gaussians may move in the rest pose.
@@ -14,6 +14,13 @@ pub struct Free {
     pub scale: FreeScale,
     /// Whether their opacities change.
     pub opacity: bool,
+    /// No standard deviation grows beyond so many times that of the start; 0: no bound.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub scale_most: f32,
+}
+
+fn is_none(bound: &f32) -> bool {
+    *bound == 0.0
 }
 
 /// How Gaussians may move in the rest pose.

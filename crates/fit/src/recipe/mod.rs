@@ -13,7 +13,9 @@ pub use free::{Free, FreePosition, FreeRotation, FreeScale};
 pub use mesh::{MeshLayer, Stage};
 
 use crate::Error;
-use crate::options::{Clothing, Cover, NOT_NEGATIVE, POSITIVE, PoseRefinement, Schedule, Sighting, within};
+use crate::options::{
+    Clothing, Coupling, Cover, NOT_NEGATIVE, POSITIVE, PoseRefinement, Schedule, Sighting, within,
+};
 use crate::shape::ShapeOptions;
 use serde::{Deserialize, Serialize};
 
@@ -47,6 +49,9 @@ pub struct Recipe {
     pub rates: Rates,
     /// What is minimised.
     pub loss: LossTerms,
+    /// How Gaussians follow their neighbours.
+    #[serde(default, skip_serializing_if = "Coupling::is_default")]
+    pub coupling: Coupling,
     /// How Gaussians come and go; their number is fixed if absent.
     #[serde(default)]
     pub densify: Option<Densify>,
@@ -213,6 +218,9 @@ pub struct Rates {
     pub colour: f32,
     /// Other SH coefficients.
     pub colour_rest: f32,
+    /// What all rates but that of positions are multiplied by at the last iteration; in between they fall by a constant factor.
+    #[serde(default = "defaults::one", skip_serializing_if = "defaults::is_one")]
+    pub decay: f32,
 }
 
 /// Weights of what is minimised: `(1 - ssim) L1 + ssim (1 - SSIM)` on colour plus the terms below.
@@ -287,6 +295,14 @@ pub struct Densify {
 
 /// Values of fields that recipes need not name.
 mod defaults {
+    pub(super) fn one() -> f32 {
+        1.0
+    }
+
+    pub(super) fn is_one(value: &f32) -> bool {
+        *value == 1.0
+    }
+
     pub(super) fn most_crossings() -> u32 {
         16
     }
@@ -382,6 +398,7 @@ impl Recipe {
             ("loss.opacity", loss.opacity),
             ("loss.displacement", loss.displacement),
             ("loss.sh_rest", loss.sh_rest),
+            ("free.scale_most", self.free.scale_most),
         ];
         let shares = [("sh_step", self.sh_step), ("loss.ssim", loss.ssim)];
         let refuse = |key: &str, value: String, expected: &str| {
@@ -389,6 +406,9 @@ impl Recipe {
         };
         if let Some((key, value)) = positive.iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
             return refuse(key, value.to_string(), "a finite number above 0");
+        }
+        if !(rates.decay > 0.0 && rates.decay <= 1.0) {
+            return refuse("rates.decay", rates.decay.to_string(), "above 0, at most 1");
         }
         if let Some((key, value)) = not_negative.iter().find(|(_, v)| !(v.is_finite() && *v >= 0.0)) {
             return refuse(key, value.to_string(), "a finite number, at least 0");
@@ -423,6 +443,7 @@ impl Recipe {
             return refuse("densify", "new Gaussians have no start".to_owned(), expected);
         }
         self.mesh.as_ref().map_or(Ok(()), |mesh| mesh.check(&self.id))?;
+        self.coupling.check("coupling")?;
         self.pose.check("pose")?;
         self.clothing.check("clothing")?;
         self.sighting.check("sighting")?;

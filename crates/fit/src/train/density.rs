@@ -189,7 +189,8 @@ impl Next {
         self.parents.push(i);
         self.shifts.push(shift);
         let origin = parameters.start[i];
-        self.origins.push(Origin { mean: origin.mean + shift, ..origin });
+        let log_scale = origin.log_scale - Vec3::splat(shrink);
+        self.origins.push(Origin { mean: origin.mean + shift, log_scale, ..origin });
     }
 }
 

@@ -7,6 +7,7 @@
 
 mod backdrop;
 mod checkpoint;
+mod coupling;
 mod density;
 mod frames;
 mod layer;
@@ -27,6 +28,7 @@ use super::texture::TexturedBody;
 use crate::options::Clothing;
 use crate::recipe::{FitOptions, Poses, Recipe, Stage, Surface};
 use backdrop::background;
+use coupling::Coupled;
 use density::Density;
 use frames::TrainingFrames;
 use layer::Layer;
@@ -88,6 +90,8 @@ pub struct Trainer<'a> {
     strategy: Strategy,
     parameters: Parameters,
     density: Density,
+    /// Who is next to whom, where neighbours are coupled.
+    coupled: Option<Coupled>,
     layer: Option<Layer>,
     /// Where they are fitted too.
     poses: Option<TrainingPoses>,
@@ -261,12 +265,14 @@ impl<'a> Trainer<'a> {
         let strategy = options.recipe.strategy.parse::<Strategy>().map_err(Error::strategy(sequence))?;
         let bound =
             BoundAvatar::new(&parameters.avatar, &sequence.body).map_err(Error::strategy(sequence))?;
+        let coupled = Coupled::new(&options.recipe.coupling, &parameters.start);
         Ok(Self {
             sequence,
             options,
             strategy,
             parameters,
             density,
+            coupled,
             layer,
             poses,
             iteration,
@@ -417,6 +423,9 @@ impl<'a> Trainer<'a> {
         if stage != Stage::Texture {
             let Parameters { avatar, start, .. } = &self.parameters;
             total += regularise::add(&recipe.loss_in(stage), avatar, start, &mut self.scratch.of_avatar);
+            if let Some(coupled) = &self.coupled {
+                total += coupled.add(&recipe.coupling, avatar, start, &mut self.scratch.of_avatar);
+            }
             let rates = RatesNow::of(recipe, self.iteration, iterations);
             self.density.observe(&self.scratch.of_posed);
             self.parameters.step(&mut self.scratch.of_avatar, &recipe.free, &rates);
@@ -435,6 +444,7 @@ impl<'a> Trainer<'a> {
             self.bound
                 .rebind(&self.parameters.avatar, body, faces)
                 .map_err(Error::strategy(self.sequence))?;
+            self.coupled = Coupled::new(&recipe.coupling, &self.parameters.start);
         }
         Ok(Step {
             iteration: self.iteration,

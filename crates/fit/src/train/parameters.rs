@@ -40,6 +40,10 @@ pub(super) struct Origin {
     pub(super) offset: f32,
     /// Angle about `normal` since then, radians.
     pub(super) angle: f32,
+    pub(super) log_scale: Vec3,
+    pub(super) opacity_logit: f32,
+    /// SH coefficient of degree 0.
+    pub(super) colour: [f32; 3],
 }
 
 /// Learning rates at one iteration.
@@ -64,13 +68,17 @@ impl RatesNow {
         } else {
             rates.position
         };
+        let decay = match rates.decay {
+            1.0 => 1.0,
+            decay => portable::pow(f64::from(decay), done) as f32,
+        };
         Self {
             position: fallen,
-            rotation: rates.rotation,
-            scale: rates.scale,
-            opacity: rates.opacity,
-            colour: rates.colour,
-            colour_rest: rates.colour_rest,
+            rotation: rates.rotation * decay,
+            scale: rates.scale * decay,
+            opacity: rates.opacity * decay,
+            colour: rates.colour * decay,
+            colour_rest: rates.colour_rest * decay,
         }
     }
 }
@@ -91,6 +99,9 @@ impl Origin {
             height: height(i),
             offset: 0.0,
             angle: 0.0,
+            log_scale: gaussians.log_scales[i],
+            opacity_logit: gaussians.opacity_logits[i],
+            colour: gaussians.sh[i * gaussians.sh_count()],
         };
         rotations.iter().enumerate().map(origin).collect()
     }
@@ -140,6 +151,12 @@ impl Parameters {
             }
             let values = bytemuck::cast_slice_mut(&mut gaussians.log_scales);
             self.scale.step(values, bytemuck::cast_slice(&gradient.log_scales), rates.scale);
+            if free.scale_most > 0.0 {
+                let most = Vec3::splat(portable::ln(free.scale_most));
+                for (log_scale, origin) in gaussians.log_scales.iter_mut().zip(&self.start) {
+                    *log_scale = log_scale.min(origin.log_scale + most);
+                }
+            }
         }
         if free.opacity {
             self.opacity.step(&mut gaussians.opacity_logits, &gradient.opacity_logits, rates.opacity);

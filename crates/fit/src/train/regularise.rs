@@ -128,27 +128,39 @@ fn sh_rest(weight: f32, avatar: &Avatar, gradient: &mut AvatarGradient) -> f64 {
 
 /// `weight` times the sum of the squared distances from the start (of face-bound Gaussians: along the normal).
 fn displacement(weight: f32, avatar: &Avatar, origins: &[Origin], gradient: &mut AvatarGradient) -> f64 {
-    let mut total = 0.0;
+    let from_start = |mean: &Vec3, origin: &Origin, out: &mut Vec3| {
+        let way = *mean - origin.mean;
+        *out += 2.0 * weight * way;
+        f64::from(weight * way.length_squared())
+    };
+    let along_normal = |offset: &f32, origin: &Origin, out: &mut f32| {
+        let way = offset - origin.height;
+        *out += 2.0 * weight * way;
+        f64::from(weight * way * way)
+    };
     match &avatar.binding {
-        Binding::Static => {}
-        Binding::Vertex(_) => {
-            let moved = avatar.gaussians.means.iter().zip(origins).zip(&mut gradient.means);
-            for ((mean, origin), out) in moved {
-                let way = *mean - origin.mean;
-                total += f64::from(weight * way.length_squared());
-                *out += 2.0 * weight * way;
-            }
-        }
+        Binding::Static => 0.0,
+        Binding::Vertex(_) => with_origins(&avatar.gaussians.means, origins, &mut gradient.means, from_start),
         Binding::Face(binding) => {
-            let moved = binding.offsets.iter().zip(origins).zip(&mut gradient.offsets);
-            for ((offset, origin), out) in moved {
-                let way = offset - origin.height;
-                total += f64::from(weight * way * way);
-                *out += 2.0 * weight * way;
-            }
+            with_origins(&binding.offsets, origins, &mut gradient.offsets, along_normal)
         }
     }
-    total
+}
+
+/// [`in_parts`] of a term that knows where each Gaussian started.
+fn with_origins<P: Sync, D: Send>(
+    parameters: &[P],
+    origins: &[Origin],
+    gradient: &mut [D],
+    term: impl Fn(&P, &Origin, &mut D) -> f64 + Sync,
+) -> f64 {
+    let parts = parameters.par_chunks(PART).zip(origins.par_chunks(PART)).zip(gradient.par_chunks_mut(PART));
+    let sums: Vec<f64> = parts
+        .map(|((own, origins), out)| {
+            own.iter().zip(origins).zip(out).map(|((own, origin), out)| term(own, origin, out)).sum()
+        })
+        .collect();
+    sums.iter().sum()
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use super::exact::Exact;
 use super::method::{Answer, METHODS, Method};
 use super::problem::{FAMILIES, Family, Problem, random_rotation};
 use super::table::{
-    Cell, Findings, LIMITS, Row, Threshold, Verdict, bisect, column, exactly, label, line as row, said, shown,
+    Cell, Findings, LIMITS, Row, Threshold, UNDETERMINED, Verdict, bisect, column, exactly, label,
+    line as row, shown,
 };
 use rayon::prelude::*;
 use skinsplat_core::math::portable;
@@ -94,10 +95,7 @@ fn measure<T: Real>(posed: &Posed<T>, answer: Option<Answer>) -> Option<Measured
         // Second order in the angle: what is lost is judged as the angle that would lose it where the gap is wide.
         let as_degrees =
             2.0 * portable::asin((loss - 32.0 * T::EPSILON.to_f64()).max(0.0).sqrt().min(1.0)).to_degrees();
-        (
-            Verdict::of(as_degrees, LIMITS.degrees),
-            format!("not determined by the input; loses {} of λ1", shown(loss)),
-        )
+        (Verdict::of(as_degrees, LIMITS.degrees), format!("{UNDETERMINED}; loses {} of λ1", shown(loss)))
     } else {
         (Verdict::of((degrees - allowed).max(0.0), LIMITS.degrees), String::new())
     };
@@ -137,7 +135,7 @@ fn line<T: Real>(precision: &'static str, method: Method, family: &Family, quick
         line.rows.push(Row {
             section: SECTION,
             family: family.id.to_owned(),
-            input: exactly(x),
+            input: exactly(family.said(x)),
             subject: method.to_string(),
             precision,
             finite: Cell::Flag(answer.is_some()),
@@ -290,19 +288,16 @@ fn verdicts(precision: &str, lines: &[Line]) -> Table {
 
 fn summary(line: &Line, family: &Family) -> table::Cell {
     if let Some(threshold) = &line.threshold {
-        return threshold.cell();
+        let words = format!("breaks {}", family.at(threshold.said));
+        return table::Cell::phrase(threshold.said, words);
     }
     let worst = line.rows.iter().map(|row| row.verdict).max().unwrap_or(Verdict::Holds);
     let first = line.rows.iter().find(|row| row.verdict == worst);
     match (worst, first) {
         (Verdict::Holds, _) | (_, None) => table::Cell::text("holds"),
         (Verdict::Degrades, Some(row)) => {
-            let at = row.input.parse().map(|x| family.said(x));
-            let words = |at: String| format!("degrades at {at}");
-            at.map_or_else(
-                |_| table::Cell::text(words(row.input.clone())),
-                |at| table::Cell::phrase(at, words(said(at))),
-            )
+            let at: f64 = row.input.parse().unwrap_or(f64::NAN);
+            table::Cell::phrase(at, format!("degrades {}", family.at(at)))
         }
         (Verdict::Breaks, Some(_)) => table::Cell::text("breaks"),
     }
@@ -330,10 +325,10 @@ fn invariances(lines: &[Line]) -> Table {
     }
 }
 
-/// A value on the axis of a family of this section as a person would say it, and what it is; none of another section's.
-pub(super) fn said_of(family: &str, input: &str) -> Option<(f64, &'static str)> {
-    let family = FAMILIES.iter().find(|known| known.id == family)?;
-    Some((family.said(input.parse().ok()?), family.said_axis()))
+/// The input of a row of this section, and what it is; none of another section's.
+pub(super) fn said_of(row: &Row) -> Option<(f64, &'static str)> {
+    let family = FAMILIES.iter().find(|known| known.id == row.family)?;
+    Some((row.input.parse().ok()?, family.said_axis()))
 }
 
 fn causes() -> Vec<String> {

@@ -2,7 +2,7 @@
 
 use super::averages::said_of;
 use super::report::Report;
-use super::table::{Findings, LIMITS, Row};
+use super::table::{Findings, LIMITS, Row, UNDETERMINED};
 use skinsplat_page::{Chart, Page, Part, Picture, Point, Section, Series};
 use std::collections::BTreeMap;
 
@@ -45,8 +45,10 @@ type Subjects<'a> = BTreeMap<&'a str, Vec<(f64, &'a Row)>>;
 fn curves(findings: &Findings) -> Vec<Chart> {
     let mut families: BTreeMap<&str, Subjects<'_>> = BTreeMap::new();
     let mut axes: BTreeMap<&str, &str> = BTreeMap::new();
-    for row in findings.rows.iter().filter(|row| row.precision == "f64") {
-        let Some((x, axis)) = said_of(&row.family, &row.input) else { continue };
+    // Where the input has no one answer, no distance from it says anything.
+    let measured = |row: &&Row| row.precision == "f64" && !row.note.starts_with(UNDETERMINED);
+    for row in findings.rows.iter().filter(measured) {
+        let Some((x, axis)) = said_of(row) else { continue };
         axes.insert(&row.family, axis);
         families.entry(&row.family).or_default().entry(&row.subject).or_default().push((x, row));
     }

@@ -1,5 +1,6 @@
 //! Hard rotation averages: families of problems along an axis, from easy to impossible.
 
+use super::table::said;
 use skinsplat_core::math::portable;
 use skinsplat_core::math::random::SplitMix64;
 use skinsplat_core::math::{Quaternion, rotation};
@@ -44,6 +45,20 @@ impl Family {
             BEYOND => 180.0 + x,
             _ => x,
         }
+    }
+
+    /// The last input at which a subject broke, said: with its unit, and on which side of it the harder inputs are.
+    pub(super) fn at(&self, said_value: f64) -> String {
+        let unit = match self.said_axis() {
+            "bones" if said_value == 1.0 => " bone",
+            "bones" => " bones",
+            axis if axis.ends_with(", rad") => " rad",
+            axis if axis.contains("degrees") => "°",
+            _ => "",
+        };
+        let falls = self.points.last().map(|&x| self.said(x)) < self.points.first().map(|&x| self.said(x));
+        let side = if self.continuous && falls { "below" } else { "at" };
+        format!("{side} {}{unit}", said(said_value))
     }
 
     /// What that value is.
@@ -105,8 +120,9 @@ fn random_bones(n: f64, spread: Option<f64>, seed: u64) -> Problem {
         }
     };
     let quats = (0..count).map(|_| bone(&mut random)).collect();
-    let weights = (0..count).map(|_| 0.05 + f64::from(random.unit_f32())).collect();
-    placed(quats, weights)
+    let shares: Vec<f64> = (0..count).map(|_| 0.05 + f64::from(random.unit_f32())).collect();
+    let sum: f64 = shares.iter().sum();
+    placed(quats, shares.into_iter().map(|share| share / sum).collect())
 }
 
 /// Three bones on orthogonal axes of R⁴, weights in steps of `gap`: the gap of the eigenvalues.
@@ -159,7 +175,7 @@ pub(super) const FAMILIES: [Family; 15] = [
     Family {
         id: "to 180°",
         axis: BELOW,
-        about: "two bones of equal weight; a tie at 0",
+        about: "two bones of equal weight; a tie at 180°",
         points: &[179.9, 150.0, 90.0, 60.0, 30.0, 10.0, 3.0, 1.0, 0.1, 1e-3, 1e-6, 1e-9, 0.0],
         continuous: true,
         make: |x| pair(nearly_half_turn(x), [0.5, 0.5]),

@@ -156,6 +156,9 @@ pub const LIMITS: Limits = Limits {
     jump_degrees: [0.1, 1.0],
 };
 
+/// How the note of a row begins whose input has no one answer.
+pub(super) const UNDETERMINED: &str = "not determined by the input";
+
 /// One input given to one subject in one precision.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
@@ -163,7 +166,7 @@ pub struct Row {
     pub section: &'static str,
     /// The kind of input.
     pub family: String,
-    /// The input: a value on the family's axis, or a name.
+    /// The input as a person would say it: a value on the family's axis, or a name.
     pub input: String,
     /// The solver, strategy or part of the renderer.
     pub subject: String,
@@ -204,13 +207,6 @@ pub struct Threshold {
     pub axis: String,
     /// What a person would say for the value: the angle itself where the axis counts from 180 degrees.
     pub said: f64,
-}
-
-impl Threshold {
-    /// `breaks at 162.5`.
-    pub(super) fn cell(&self) -> skinsplat_table::Cell {
-        skinsplat_table::Cell::phrase(self.said, format!("breaks at {}", said(self.said)))
-    }
 }
 
 /// A value on an axis as a person would say it: an angle near half a turn has a digit after the point.
