@@ -32,4 +32,5 @@ pub const FURTHER: &[(&str, &str)] = &[
     ("experiments/parts.toml", include_str!("../../experiments/parts.toml")),
     ("experiments/pushforward.toml", include_str!("../../experiments/pushforward.toml")),
     ("experiments/swap.toml", include_str!("../../experiments/swap.toml")),
+    ("experiments/tuning.toml", include_str!("../../experiments/tuning.toml")),
 ];

@@ -2,7 +2,7 @@
 
 use super::scenes::{FAMILIES, Family, Scene};
 use super::table::{
-    Cell, Findings, LIMITS, Row, Threshold, Verdict, bisect, column, exactly, label, line, shown, words,
+    Cell, Findings, LIMITS, Row, Threshold, Verdict, bisect, column, exactly, label, line, said, shown, words,
 };
 use skinsplat_core::scene::{Camera, Rendered, SceneError};
 use skinsplat_render::splat::{Renderer, SimdLevel, render};
@@ -104,7 +104,13 @@ pub(super) fn run(quick: bool) -> Result<Findings, SceneError> {
             findings.rows.push(row);
         }
         let broken = findings.thresholds.iter().find(|t| t.family == family.id);
-        let verdict = broken.map_or_else(|| table::Cell::text(worst.to_string()), Threshold::cell);
+        let verdict = broken.map_or_else(
+            || table::Cell::text(worst.to_string()),
+            |threshold| {
+                let words = format!("breaks at {}", said(threshold.said));
+                table::Cell::phrase(threshold.said, words)
+            },
+        );
         let labels = [family.id.to_owned(), family.axis.to_owned()];
         table.rows.push(line(labels, vec![verdict, table::Cell::text(cells.join(", "))]));
     }
