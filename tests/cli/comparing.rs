@@ -134,6 +134,7 @@ fn a_page_goes_on_without_a_picture_that_is_gone() {
 fn what_cannot_be_compared_is_refused_in_one_line() {
     let desk = finished();
     desk.put("begun/frames.jsonl", "");
+    desk.put("f.toml", "[frames]\npsnr = 1\n");
     desk.run(args!["report", "begun"]).refuses(&["results.json", "not there yet"], "a run that is not done");
     for (arguments, parts) in [
         (args!["compare", "run"], ["one run", "expected two"]),
@@ -143,10 +144,22 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
         (args!["compare", "run", "run", "--format", "pdf"], ["pdf", "junit"]),
         (args!["compare", "run", "run", "--save", "pdf=x"], ["pdf=x", "junit"]),
         (args!["compare", "run", "run", "--save", "csv=no/such/folder/x"], ["no/such/folder", ""]),
+        (args!["compare", "run", "run", "--save", "csv=a", "--save", "json=no/such/x"], ["no/such/x", ""]),
+        (args!["compare", "run", "run", "--save", "csv=a", "--save", "csv=b"], ["csv=b", "csv twice"]),
+        (args!["compare", "run", "run", "--save", "csv=a", "--save", "json=./a"], ["json=./a", "file twice"]),
+        (args!["compare", "run", "run", "--save", "csv=-"], ["csv=-", "expected a file"]),
+        (args!["compare", "run", "--against-paper", "--tolerances", "f.toml"], ["f.toml: [frames]", "none"]),
+        (args!["compare", "run", "--against-paper", "--frames", "3"], ["--against-paper", "--frames"]),
+        (args!["report", "run", "--strict"], ["--baseline", "required"]),
+        (args!["report", "run", "--all"], ["--baseline", "required"]),
+        (args!["report", "run", "--frames", "3"], ["--baseline", "required"]),
+        (args!["report", "run", "--tolerance-psnr", "3"], ["--baseline", "required"]),
+        (args!["report", "run", "--tolerances", "f.toml"], ["--baseline", "required"]),
     ] {
         let shown = format!("{arguments:?}");
         desk.run(arguments).refuses(&parts, &shown);
     }
+    assert!(!desk.path("a").exists(), "nothing is written before all can be");
     desk.put("old.json", changed(&desk, |r| r["schema"] = Value::from(2)).to_string());
     desk.run(args!["compare", "old.json", "run"])
         .refuses(&["old.json", "schema: 2", "3 to 4"], "an older schema");

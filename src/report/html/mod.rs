@@ -12,6 +12,7 @@ use crate::experiment::Source;
 use pictures::Budget;
 use skinsplat_page::{Page, Part, Section};
 use skinsplat_table::Table;
+use skinsplat_table::markdown::code_span;
 use std::collections::BTreeMap;
 
 /// What a page may hold beside the results.
@@ -73,11 +74,11 @@ fn page(results: &Results, extras: &Extras, budget: &Budget) -> Page {
         _ => "Results".to_owned(),
     });
     page = page.lead(format!(
-        "Made by `{}`. Bold is the best value of a sequence, with everything that the frames do not decide to be worse: where \
+        "Made by {}. Bold is the best value of a sequence, with everything that the frames do not decide to be worse: where \
          they are too few to decide anything, all of it. Counts are bold only where they are what the table is about. ↑: more is \
          better, ↓: less is better; n/c: not computed. Headings sort; whoever points at a number sees all of its digits, or its \
          interval.",
-        super::page::command(results)
+        code_span(&super::page::command(results))
     ));
     let code = results.code;
     page = page.lead(format!(
