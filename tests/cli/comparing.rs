@@ -115,6 +115,11 @@ fn pictures_that_both_runs_kept_are_named() {
     assert!(!out.contains("pictures"), "one of the runs has none");
 }
 
+fn kept_gif(desk: &Desk) -> std::path::PathBuf {
+    let kept = crate::program::contents(&desk.path("run/pictures"));
+    kept.into_iter().map(|(path, _)| path).find(|path| path.extension().is_some_and(|e| e == "gif")).unwrap()
+}
+
 /// A page shows the pictures that are there.
 #[test]
 fn a_page_goes_on_without_a_picture_that_is_gone() {
@@ -128,6 +133,30 @@ fn a_page_goes_on_without_a_picture_that_is_gone() {
     assert!(told.out.contains("<html") && told.out.len() < whole.len());
     let name = picture.file_name().unwrap().to_string_lossy().into_owned();
     assert!(told.err.contains(&name) && told.err.contains("not shown"), "{}", told.err);
+    assert!(told.err.matches("expected").count() <= 1, "{}", told.err);
+    assert!(told.out.contains("could not be read and are not shown: <code>"), "the page says which");
+    assert!(!told.out.contains("to keep the page small"));
+}
+
+/// Files beside the results that are no such files, or not there.
+#[test]
+fn a_page_says_what_it_was_made_without() {
+    let desk = finished();
+    desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "2", "--images", "-q"]);
+    let whole = desk.ok(args!["report", "run", "--format", "html"]);
+    let gif = kept_gif(&desk);
+    let bytes = std::fs::read(&gif).unwrap();
+    std::fs::write(&gif, &bytes[..bytes.len() / 2]).unwrap();
+    let told = desk.run(args!["report", "run", "--format", "html"]).exits(0, "the others are there");
+    let gifs = |page: &str| page.matches("data:image/gif;base64,").count();
+    assert_eq!(gifs(&told.out) + 1, gifs(&whole), "half of a GIF");
+    assert!(told.out.contains(&*gif.file_name().unwrap().to_string_lossy()), "the page says which");
+    std::fs::remove_file(desk.path("run/frames.jsonl")).unwrap();
+    desk.put("run/curves.csv", "garbage");
+    let page = || desk.run(args!["report", "run", "--format", "html"]);
+    page().refuses(&["curves.csv", "not the CSV that was expected"], "garbage");
+    std::fs::remove_file(desk.path("run/curves.csv")).unwrap();
+    assert!(page().exits(0, "without records").out.contains("there is no <code>frames.jsonl</code>"));
 }
 
 #[test]
