@@ -63,9 +63,7 @@ pub(super) fn beside_run(target: &Path, run: &Path) -> Result<()> {
     }
     let in_run = own.parent() == Some(&folder);
     let ends = |ending: &&str| own.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
-    if in_run && WRITTEN.iter().any(|ending| ends(&ending))
-        || FOLDERS.iter().any(|name| own.starts_with(folder.join(name)))
-    {
+    if in_run && WRITTEN.iter().any(ends) || FOLDERS.iter().any(|name| own.starts_with(folder.join(name))) {
         bail!("{}: it is written by this run; expected another file", target.display());
     }
     // The folder itself is made once there is a plan.
