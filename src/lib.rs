@@ -23,6 +23,7 @@
 
 pub mod datasets;
 pub mod experiment;
+pub mod quoting;
 pub mod report;
 pub mod run;
 

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 /// Modules of the harness, lowest first: one imports only from those before it.
-const MODULES: [&str; 5] = ["toml_problem", "datasets", "experiment", "run", "report"];
+const MODULES: [&str; 6] = ["toml_problem", "quoting", "datasets", "experiment", "run", "report"];
 
 /// The crates, and what each may be built on. Tests and examples may use more.
 const CRATES: [(&str, &[&str]); 18] = [

@@ -1,12 +1,12 @@
 //! `reproduce batch`: scripts that hand a run to a cluster. It prints them; whoever runs them submits.
 
 use super::output::emit;
-use super::quoting::quoted;
 use super::run::Run;
 use super::{Cli, Command, Exit, one_line};
 use anyhow::{Context as _, Result, bail};
 use clap::Parser;
 use skinsplat::experiment::MOST_SHARDS;
+use skinsplat::quoting::quoted;
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 

@@ -1,6 +1,6 @@
 //! `reproduce compare`: a run against an earlier one, or against the paper.
 
-use super::output::{apart, emit, save, written};
+use super::output::{apart, emit, resolved, save, written};
 use super::page::PICTURES;
 use super::selection::name_and_path;
 use super::tolerances::ToleranceOptions;
@@ -12,6 +12,7 @@ use skinsplat::report::{Results, picture_name};
 use skinsplat::run::pictures::single_picture;
 use skinsplat::run::store;
 use skinsplat_core::choice::one_of;
+use skinsplat_data::atomic;
 use skinsplat_data::error::read_text;
 use skinsplat_table::{FORMATS, to_json};
 use std::collections::BTreeSet;
@@ -31,8 +32,8 @@ pub(super) struct Compare {
     #[command(flatten)]
     how: Comparing,
     /// Judge the tables of real data by the printed numbers, instead of a baseline: each may miss by half of the printed one's last
-    /// digit and twice our standard deviation over seeds
-    #[arg(long)]
+    /// digit, or a tolerance that is given instead, and twice our standard deviation over seeds
+    #[arg(long, conflicts_with = "shown")]
     against_paper: bool,
     /// How to print the comparison
     #[arg(long, value_name = "FORMAT", value_parser = formats(), default_value = "text")]
@@ -45,23 +46,26 @@ pub(super) struct Compare {
     tables: Vec<String>,
 }
 
+/// The heading of what is asked of comparisons.
+pub(super) const COMPARISON: &str = "Comparison";
+
 /// How a comparison is made, whoever asks for it.
 #[derive(Debug, clap::Args)]
 pub(super) struct Comparing {
     /// TOML file of tolerances: `psnr = 0.05`; for one table under `[tables.ID]`; for single frames, which count only then, under
     /// `[frames]`. The options below go before it; inf: whatever it is
-    #[arg(long, value_name = "FILE", help_heading = "Comparison")]
+    #[arg(long, value_name = "FILE", help_heading = COMPARISON)]
     tolerances: Option<PathBuf>,
     #[command(flatten)]
     asked: ToleranceOptions,
     /// What improved by more than its tolerance counts too: for a program whose numbers should not move
-    #[arg(long, help_heading = "Comparison")]
+    #[arg(long, help_heading = COMPARISON)]
     strict: bool,
     /// Numbers of frames to show, those that got worse first
-    #[arg(long = "frames", value_name = "N", default_value_t = 10, help_heading = "Comparison")]
+    #[arg(long = "frames", value_name = "N", default_value_t = 10, help_heading = COMPARISON)]
     shown: usize,
     /// Show what is unchanged too (csv, latex and json always have it)
-    #[arg(long, help_heading = "Comparison")]
+    #[arg(long, help_heading = COMPARISON)]
     all: bool,
 }
 
@@ -105,10 +109,9 @@ fn saving() -> impl TypedValueParser<Value = Saving> {
 
 impl Compare {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
-        let targets = self.save.iter().map(|saving| saving.file.as_path());
-        targets.into_iter().try_for_each(|file| apart(file, self.runs.iter().map(PathBuf::as_path)))?;
+        self.check_targets()?;
         let changes = match (&self.runs[..], self.against_paper) {
-            ([run], true) => compare::against_paper(&self.chosen(load(run)?)?),
+            ([run], true) => self.how.against_paper(&self.chosen(load(run)?)?)?,
             ([baseline, current], false) => {
                 let both = [load(baseline)?, load(current)?];
                 check_tables(&self.tables, &both)?;
@@ -126,6 +129,26 @@ impl Compare {
             save(file, &text)?;
         }
         self.how.print(&changes, &self.format, context)
+    }
+
+    /// Finds out what could not be written before anything is.
+    fn check_targets(&self) -> Result<()> {
+        for (i, Saving { format, file }) in self.save.iter().enumerate() {
+            let shown = format!("--save {format}={}", file.display());
+            if file.as_os_str() == "-" {
+                bail!("{shown}; expected a file: --format {format} prints it");
+            }
+            let before = &self.save[..i];
+            if before.iter().any(|other| other.format == *format) {
+                bail!("{shown}: {format} twice; expected each format once");
+            }
+            if before.iter().any(|other| resolved(&other.file) == resolved(file)) {
+                bail!("{shown}: the same file twice; expected one for each format");
+            }
+            apart(file, self.runs.iter().map(PathBuf::as_path))?;
+            atomic::check(file)?;
+        }
+        Ok(())
     }
 
     fn chosen(&self, results: Results) -> Result<Results> {
@@ -161,8 +184,24 @@ impl Comparing {
     /// # Errors
     /// A file of tolerances that cannot be read or says something else.
     pub(super) fn compare(&self, baseline: &Results, current: &Results) -> Result<Changes> {
-        let changes = compare::compare(baseline, current, &self.tolerances()?).with_frames(self.shown);
-        Ok(if self.strict { changes.strictly() } else { changes })
+        Ok(self.judged(compare::compare(baseline, current, &self.tolerances()?)))
+    }
+
+    /// Judges by the printed numbers, as the options say.
+    ///
+    /// # Errors
+    /// As [`Self::compare`], and tolerances of frames, of which a paper prints nothing.
+    fn against_paper(&self, results: &Results) -> Result<Changes> {
+        let tolerances = self.tolerances()?;
+        if let (Some(path), false) = (&self.tolerances, tolerances.frames.0.is_empty()) {
+            bail!("{}: [frames] with --against-paper; expected none: no frame is printed", path.display());
+        }
+        Ok(self.judged(compare::against_paper(results, &tolerances)))
+    }
+
+    fn judged(&self, changes: Changes) -> Changes {
+        let changes = changes.with_frames(self.shown);
+        if self.strict { changes.strictly() } else { changes }
     }
 
     fn tolerances(&self) -> Result<Tolerances> {

@@ -2,11 +2,11 @@
 
 use super::data::Data;
 use super::products::{MARKDOWN, Printed, kept_in};
-use super::quoting::quoted;
 use super::run::Run;
 use super::{Context, Exit};
 use anyhow::Result;
 use clap::Parser;
+use skinsplat::quoting::quoted;
 use std::ffi::OsString;
 use std::path::PathBuf;
 

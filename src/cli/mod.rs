@@ -24,7 +24,6 @@ mod planning;
 mod posing;
 mod products;
 mod progress;
-mod quoting;
 mod render;
 mod report;
 mod run;

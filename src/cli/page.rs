@@ -1,13 +1,13 @@
 //! The page of a run: what `run --html` and `report --format html` write.
 
 use super::Context;
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, anyhow};
 use image::RgbImage;
-use skinsplat::report::Results;
 use skinsplat::report::html::{BOUND, Extras, KeptPictures, MovingPicture, Stills, frames_that_fit, html};
 use skinsplat::report::timing;
+use skinsplat::report::{Results, check_curves};
 use skinsplat::run::costs::{self, Costs};
-use skinsplat::run::pictures::{INDEX, Index, Keep, Kept, Moving};
+use skinsplat::run::pictures::{INDEX, Index, Keep, Kept, Moving, check_gif};
 use skinsplat::run::store;
 use skinsplat_data::error::{read_bytes, read_text};
 use skinsplat_data::{atomic, select::evenly_spaced};
@@ -46,12 +46,9 @@ pub(super) const PICTURES: &str = "pictures";
 /// # Errors
 /// Records that cannot be read; the message names the file.
 pub(super) fn page(results: &Results, folder: &Path, images: Images, context: Context) -> Result<String> {
-    let curves = folder.join("curves.csv");
-    let curves = match curves.is_file() {
-        true => read_text(&curves, "curves", "the curves.csv of a run")?,
-        false => String::new(),
-    };
-    let records = store::merge(store::stores(folder)?.iter().map(std::path::PathBuf::as_path))?;
+    let curves = curves(&folder.join("curves.csv"))?;
+    let stores = store::stores(folder)?;
+    let records = store::merge(stores.iter().map(std::path::PathBuf::as_path))?;
     let measured = folder.join(costs::FILE_NAME);
     let measured: Option<Costs> = match measured.is_file() {
         true => Some(super::selection::read_json(&measured)?),
@@ -59,25 +56,31 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images, context: Co
     };
     let tables = timing::costs(results, &records, measured.as_ref()).into_iter().collect();
     let bends = records.into_values().filter_map(|record| Some((record.key, record.bend?))).collect();
-    let mut extras = Extras { pictures: KeptPictures::default(), bends, curves, tables, bound: BOUND };
+    let recorded = !stores.is_empty();
+    let mut extras =
+        Extras { pictures: KeptPictures::default(), bends, curves, tables, recorded, bound: BOUND };
     let pictures = folder.join(PICTURES);
     let Some(mut index) = index(&pictures, images)? else { return Ok(html(results, &extras)) };
     // The run may have tables that the page has not.
     let has = |table: &String| results.tables.iter().any(|own| own.experiment == *table);
     index.frames.retain(|kept| has(&kept.table));
     index.moving.retain(|of| has(&of.table));
-    extras.pictures.kept = index.frames.len();
     let mut lost = Lost::default();
-    extras.pictures.moving = index.moving.iter().filter_map(|of| lost.or(moving(&pictures, of))).collect();
+    let moving = index.moving.iter().filter_map(|of| lost.or(&of.file, moving(&pictures, of)));
+    extras.pictures.moving = moving.collect();
     let mut lost_stills = Lost::default();
     extras.pictures.stills = stills(&pictures, &index.frames, FEW, &mut lost_stills);
+    extras.pictures.kept = index.frames.len();
     if index.frames.len() > FEW {
         let fit = frames_that_fit(results, &extras, index.frames.len());
         lost_stills = Lost::default();
         extras.pictures.stills = stills(&pictures, &index.frames, fit, &mut lost_stills);
     }
-    [lost, lost_stills].iter().for_each(|lost| lost.say(context));
-    extras.pictures.unread = unread(&index.frames, &extras.pictures.stills);
+    [&lost, &lost_stills].into_iter().for_each(|lost| lost.say(context));
+    extras.pictures.kept = index.frames.len() - lost_stills.of.len();
+    let unread = unread(&index.frames, &extras.pictures.stills).into_iter();
+    extras.pictures.unread = unread.filter(|names| !lost_stills.of.contains(&names.join(", "))).collect();
+    extras.pictures.lost = lost_stills.of.into_iter().chain(lost.of).collect();
     Ok(html(results, &extras))
 }
 
@@ -105,16 +108,17 @@ fn index(folder: &Path, images: Images) -> Result<Option<Index>> {
 /// Pictures that the run kept and that cannot be read any more.
 #[derive(Default)]
 struct Lost {
-    count: usize,
-    /// The first, and why.
+    /// Of what they are.
+    of: Vec<String>,
+    /// Why the first cannot be read.
     first: Option<anyhow::Error>,
 }
 
 impl Lost {
-    /// What was read; counted if it was not.
-    fn or<T>(&mut self, read: Result<T>) -> Option<T> {
+    /// What was read; noted if it was not.
+    fn or<T>(&mut self, of: &str, read: Result<T>) -> Option<T> {
         read.map_err(|error| {
-            self.count += 1;
+            self.of.push(of.to_owned());
             self.first.get_or_insert(error);
         })
         .ok()
@@ -122,10 +126,7 @@ impl Lost {
 
     fn say(&self, context: Context) {
         if let Some(first) = &self.first {
-            let count = self.count;
-            context.note(format!(
-                "{count} of the pictures are not shown: {first:#}; expected what the run kept"
-            ));
+            context.note(format!("{} of the pictures are not shown: {first:#}", self.of.len()));
         }
     }
 }
@@ -133,14 +134,34 @@ impl Lost {
 /// The pictures of at most so many frames, evenly spaced, without those that cannot be read.
 fn stills(folder: &Path, frames: &[Kept], most: usize, lost: &mut Lost) -> Vec<Stills> {
     let frames: Vec<&Kept> = frames.iter().collect();
-    evenly_spaced(&frames, Some(most)).into_iter().filter_map(|kept| lost.or(still(folder, kept))).collect()
+    let read = |kept: &Kept| lost.or(&names(kept).map(String::as_str).join(", "), still(folder, kept));
+    evenly_spaced(&frames, Some(most)).into_iter().filter_map(read).collect()
 }
 
 /// Frames whose pictures were not read.
 fn unread(frames: &[Kept], read: &[Stills]) -> Vec<[String; 3]> {
     let read: BTreeSet<[&String; 3]> = read.iter().map(|of| [&of.table, &of.sequence, &of.frame]).collect();
-    let names = frames.iter().map(|of| [&of.table, &of.sequence, &of.frame]);
-    names.filter(|names| !read.contains(names)).map(|names| names.map(String::clone)).collect()
+    frames
+        .iter()
+        .map(names)
+        .filter(|names| !read.contains(names))
+        .map(|names| names.map(String::clone))
+        .collect()
+}
+
+/// Table, sequence and frame.
+fn names(of: &Kept) -> [&String; 3] {
+    [&of.table, &of.sequence, &of.frame]
+}
+
+/// How fits went; nothing if there were none.
+fn curves(path: &Path) -> Result<String> {
+    if !path.is_file() {
+        return Ok(String::new());
+    }
+    let text = read_text(path, "curves", "the curves.csv of a run")?;
+    check_curves(&text).map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
+    Ok(text)
 }
 
 fn still(folder: &Path, kept: &Kept) -> Result<Stills> {
@@ -165,9 +186,8 @@ fn still(folder: &Path, kept: &Kept) -> Result<Stills> {
 fn moving(folder: &Path, of: &Moving) -> Result<MovingPicture> {
     let path = folder.join(&of.file);
     let gif = read_bytes(&path, "picture", "a GIF that the run kept")?;
-    // Width and height are the first words after the signature.
-    let word = |at: usize| gif.get(at..at + 2).map_or(1, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
-    let size = [word(6), word(8)];
+    let size = check_gif(&gif, of.frames[0])
+        .map_err(|problem| anyhow!("{}: cannot read the picture: {problem}", path.display()))?;
     Ok(MovingPicture {
         table: of.table.clone(),
         sequence: of.sequence.clone(),

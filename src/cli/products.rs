@@ -1,10 +1,10 @@
 //! What a run leaves in its folder, whoever collected the records: tables, curves, verdict.
 
 use super::output::{table_format, written};
-use super::quoting::quoted;
 use super::{Context, Exit};
 use anyhow::Result;
 use skinsplat::experiment::{Experiment, Plan};
+use skinsplat::quoting::quoted;
 use skinsplat::report;
 use skinsplat::run::plan_file::LeftOut;
 use skinsplat::run::{self, Error};

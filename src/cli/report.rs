@@ -1,12 +1,13 @@
 //! `reproduce report`: the tables of a run again, or against a baseline.
 
-use super::compare::{Comparing, check_tables, folder, load, only};
+use super::compare::{COMPARISON, Comparing, check_tables, folder, load, only};
 use super::output::{apart, emit, save, written};
 use super::page::{Images, page, write_page};
 use super::products::{MARKDOWN, printed};
 use super::selection::read_json;
 use super::{Context, Exit};
 use anyhow::{Result, bail};
+use clap::Arg;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use skinsplat::report::{self, Results};
 use skinsplat::run::provenance::Phases;
@@ -18,7 +19,7 @@ use std::path::PathBuf;
 ///
 /// With --baseline it is `reproduce compare BASELINE RUN`, with the same exit codes.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, mut_args(of_comparisons))]
 pub(super) struct Report {
     /// Folder of a run, or its results.json
     #[arg(value_name = "RUN", default_value = super::run::DEFAULT_OUT)]
@@ -29,9 +30,9 @@ pub(super) struct Report {
     /// Write to a file [default: standard output]
     #[arg(long, value_name = "FILE", conflicts_with = "baseline")]
     out: Option<PathBuf>,
-    /// Which of the pictures that the run kept (`run --images`) a page shows
-    #[arg(long, value_enum, value_name = "WHICH", default_value_t = Images::All)]
-    images: Images,
+    /// Which of the pictures that the run kept (`run --images`) a page (--format html) shows [default: all]
+    #[arg(long, value_enum, value_name = "WHICH")]
+    images: Option<Images>,
     /// Where the time went, instead of the tables: plan, avatars and frames of the last call, posing, drawing and scoring
     #[arg(long, conflicts_with = "baseline")]
     timing: bool,
@@ -39,10 +40,18 @@ pub(super) struct Report {
     #[arg(long, value_name = "EXPERIMENT")]
     table: Option<String>,
     /// Folder of an earlier run, or its results.json: print what moved, as `reproduce compare` does
-    #[arg(long, value_name = "RUN", help_heading = "Comparison")]
+    #[arg(long, value_name = "RUN", help_heading = COMPARISON)]
     baseline: Option<PathBuf>,
     #[command(flatten)]
     comparing: Comparing,
+}
+
+/// Options that say how to compare want something to compare with.
+fn of_comparisons(arg: Arg) -> Arg {
+    match arg.get_help_heading() == Some(COMPARISON) && arg.get_id() != "baseline" {
+        true => arg.requires("baseline"),
+        false => arg,
+    }
 }
 
 const EXAMPLES: &str = "\
@@ -55,7 +64,10 @@ Examples:
 impl Report {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let tables: Vec<String> = self.table.iter().cloned().collect();
-        self.out.iter().try_for_each(|path| apart(path, [self.run.as_path()]))?;
+        if self.images.is_some() && self.format(MARKDOWN) != HTML {
+            bail!("--images without --format html; expected a page, which alone has pictures");
+        }
+        self.out.iter().try_for_each(|path| apart(path, [self.run.as_path(), folder(&self.run)]))?;
         let results = load(&self.run)?;
         if let Some(baseline) = &self.baseline {
             let format = self.format("text");
@@ -86,7 +98,7 @@ impl Report {
     /// The tables in the wanted format.
     fn tables(&self, results: &Results, context: Context) -> Result<String> {
         Ok(match self.format(MARKDOWN) {
-            HTML => page(results, folder(&self.run), self.images, context)?,
+            HTML => page(results, folder(&self.run), self.images.unwrap_or(Images::All), context)?,
             format => printed(results, format),
         })
     }

@@ -1,6 +1,6 @@
 //! `reproduce run`: the main job.
 
-use super::output::{apart, emit, written};
+use super::output::{apart, beside_run, emit, written};
 use super::page::{Images, PICTURES, page, write_page};
 use super::planning::{Planned, Planning};
 use super::products::{
@@ -116,13 +116,10 @@ impl Run {
 
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let start = Instant::now();
-        let read = self.planning.files().chain([self.out.as_path()]);
-        self.html.iter().try_for_each(|path| apart(path, read.clone()))?;
-        // The folder itself is made once there is a plan.
-        self.html
-            .iter()
-            .filter(|path| !path.starts_with(&self.out))
-            .try_for_each(|path| atomic::check(path))?;
+        if let Some(path) = &self.html {
+            beside_run(path, &self.out)?;
+            apart(path, self.planning.files())?;
+        }
         let mut planned = self.planning.plan()?;
         planned.left_over().into_iter().for_each(|note| context.note(note));
         let motion = self.motion(&mut planned, context)?;

@@ -81,9 +81,7 @@ impl Stress {
         write(&out.join("stress.csv"), &report.csv())?;
         write(&out.join("stress.json"), &json)?;
         write(&out.join("stress.md"), &markdown)?;
-        if !context.quiet {
-            emit(self.format.of(&markdown, &json))?;
-        }
+        emit(self.format.of(&markdown, &json))?;
         Ok(Exit::Success)
     }
 

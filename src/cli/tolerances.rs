@@ -1,5 +1,6 @@
 //! `--tolerance-METRIC` for every metric of [`MetricId::all`].
 
+use super::compare::COMPARISON;
 use clap::{Arg, ArgMatches, Args, Command, Error, FromArgMatches};
 use skinsplat::report::compare::Allowed;
 use skinsplat_metrics::MetricId;
@@ -22,7 +23,7 @@ fn option(metric: MetricId) -> Arg {
         .value_name(value_name)
         .value_parser(tolerance)
         .help(format!("{} that may be {worse}{unit} [default: {}]", known.title, known.tolerance))
-        .help_heading("Comparison")
+        .help_heading(COMPARISON)
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {

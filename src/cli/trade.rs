@@ -112,9 +112,7 @@ impl Trading {
         }
         drop(watch);
         let page = self.write(&result, &sweeps)?;
-        if !context.quiet {
-            emit(self.format.of(&page, &trade::json(&result)))?;
-        }
+        emit(self.format.of(&page, &trade::json(&result)))?;
         Ok(Exit::Success)
     }
 

@@ -6,11 +6,46 @@ use skinsplat_plot::{Lines, PlotError, Series, svg};
 use skinsplat_table::csv_text;
 use std::collections::BTreeMap;
 
+const COLUMNS: [&str; 9] = [
+    "experiment",
+    "dataset",
+    "subject",
+    "variant",
+    "iteration",
+    "loss",
+    "training_psnr",
+    "test_psnr",
+    "splats",
+];
+
+/// Checks that a text is one of [`curves_csv`]'s.
+///
+/// # Errors
+/// One line: what is wrong, where, and what was expected.
+pub fn check_curves(text: &str) -> Result<(), String> {
+    let mut reader = ::csv::Reader::from_reader(text.as_bytes());
+    let headings = reader.headers().map_err(|error| error.to_string())?;
+    if headings != COLUMNS.as_slice() {
+        return Err(format!("not the CSV that was expected: columns {}", COLUMNS.join(", ")));
+    }
+    for record in reader.records() {
+        let record = record.map_err(|error| format!("not the CSV that was expected: {error}"))?;
+        let numbers = || COLUMNS.iter().zip(&record).skip(4);
+        let wrong = numbers().find(|(name, field)| {
+            field.parse::<f64>().is_err() && (**name == "iteration" || !field.is_empty())
+        });
+        if let Some((name, field)) = wrong {
+            let line = record.position().map_or(0, ::csv::Position::line);
+            return Err(format!("line {line}: {name}: `{field}`; expected a number"));
+        }
+    }
+    Ok(())
+}
+
 /// A line per point, a column per number; a field without a number is empty.
 pub fn curves_csv(curves: &[Curve]) -> String {
     let mut lines = ::csv::Writer::from_writer(Vec::new());
-    let headings = ["experiment", "dataset", "subject", "variant", "iteration", "loss", "training_psnr"];
-    lines.write_record(headings.iter().chain(&["test_psnr", "splats"])).expect("memory takes every write");
+    lines.write_record(COLUMNS).expect("memory takes every write");
     let number =
         |value: Option<f64>, digits: usize| value.map_or_else(String::new, |v| format!("{v:.digits$}"));
     for Curve { experiment, dataset, subject, variant, points } in curves {

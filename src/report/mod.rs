@@ -33,7 +33,7 @@ pub use crate::run::gallery::picture_name;
 pub use bend::{bend_csv, bend_plots};
 pub use collect::{results, results_of, table_results};
 pub use comparison::{Comparison, MetricDifference};
-pub use curves::{curve_plots, curves_csv};
+pub use curves::{check_curves, curve_plots, curves_csv};
 pub use markdown::markdown;
 pub use page::{head, incomplete, page};
 pub use results::{

@@ -3,7 +3,10 @@
 use super::captions::count;
 use super::{Results, TableResults, markdown};
 use crate::experiment::{ADDED_VARIANT, AvatarRecipe, Experiment, GIVEN_AVATAR, Options, Profile};
+use crate::quoting::quoted;
+use skinsplat_table::markdown::code_span;
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 
 /// The page: how it was made, what is missing, and the tables.
 pub fn page(results: &Results) -> String {
@@ -19,13 +22,13 @@ pub fn page(results: &Results) -> String {
 pub fn head(results: &Results) -> String {
     let code = results.code;
     format!(
-        "# Results\n\nMade by `{}`, on the data that the tables name (experiment files and a data folder are further \
+        "# Results\n\nMade by {}, on the data that the tables name (experiment files and a data folder are further \
          arguments). Nothing on this page depends on the time or the machine. Bold is the best value of a \
          sequence, with everything that the frames do not decide to be worse: where they are too few to decide anything, all of \
          it. Counts are bold only where they are what the table is about. ↑: more is better, ↓: less is better; \
          n/c: not computed.\n\n\
          Plan `{}`; code versions: fit {}, strategy {}, render {}, metrics {}.\n",
-        command(results),
+        code_span(&command(results)),
         results.plan,
         code.fit,
         code.strategy,
@@ -45,7 +48,7 @@ pub fn incomplete(results: &Results) -> String {
 /// The argument that gave a variant its avatar; the captions say which file that was.
 fn given_avatar(recipe: &AvatarRecipe) -> Option<String> {
     let AvatarRecipe::File { name, .. } = recipe else { return None };
-    Some(format!("--avatar {}=FILE", name.strip_prefix(GIVEN_AVATAR)?))
+    Some(option("--avatar", &format!("{}=FILE", name.strip_prefix(GIVEN_AVATAR)?)))
 }
 
 /// The arguments that gave variants of built-in experiments their frames, where those have none of their own.
@@ -55,15 +58,24 @@ fn given_renders(table: &TableResults) -> impl Iterator<Item = String> {
     let variants = table.sequences.iter().flat_map(|sequence| &sequence.variants);
     let rendered = variants.filter(|variant| matches!(variant.avatar, AvatarRecipe::Renders { .. }));
     let given = rendered.filter(move |variant| fitted.contains(&variant.id));
-    given.map(|variant| format!("--renders {}=FOLDER", variant.id))
+    given.map(|variant| option("--renders", &format!("{}=FOLDER", variant.id)))
 }
 
-/// The command that makes these tables again, from the same data.
+/// An option as a shell reads it, whatever its value holds.
+fn option(name: &str, value: &str) -> String {
+    format!("{name} {}", word(value))
+}
+
+fn word(text: &str) -> String {
+    quoted(OsStr::new(text))
+}
+
+/// The command that makes these tables again, from the same data, as a shell reads it.
 pub(super) fn command(results: &Results) -> String {
     let Options { profile, subset, lpips_weights, seeds } = &results.options;
     let mut words = vec!["reproduce run".to_owned()];
-    words.extend(results.tables.iter().map(|table| table.experiment.clone()));
-    words.push(format!("--profile {}", profile.id));
+    words.extend(results.tables.iter().map(|table| word(&table.experiment)));
+    words.push(option("--profile", &profile.id));
     let variants = results.tables.iter().flat_map(|t| &t.sequences).flat_map(|sequence| &sequence.variants);
     if variants.clone().map(|variant| &variant.id).any(|id| id.starts_with(ADDED_VARIANT)) {
         words.push("--all-strategies".to_owned());
@@ -91,7 +103,7 @@ pub(super) fn command(results: &Results) -> String {
     if let Some(limit) = subset.limit {
         words.push(format!("--limit {limit}"));
     }
-    words.extend(subset.subjects.iter().map(|id| format!("--subject {id}")));
-    words.extend(subset.variants.iter().map(|id| format!("--variant {id}")));
+    words.extend(subset.subjects.iter().map(|id| option("--subject", id)));
+    words.extend(subset.variants.iter().map(|id| option("--variant", id)));
     words.join(" ")
 }

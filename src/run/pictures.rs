@@ -275,6 +275,22 @@ fn cut(image: &Image, [x0, x1, y0, y1]: [usize; 4]) -> Result<Image, Error> {
     Ok(Image::new(x1 - x0, y1 - y0, pixels)?)
 }
 
+/// Reads a GIF of so many frames to its end; says how wide and high it is.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn check_gif(bytes: &[u8], frames: usize) -> Result<[usize; 2], String> {
+    let mut decoder = gif::DecodeOptions::new().read_info(bytes).map_err(|error| error.to_string())?;
+    let mut found = 0;
+    while decoder.read_next_frame().map_err(|error| error.to_string())?.is_some() {
+        found += 1;
+    }
+    if found != frames {
+        return Err(format!("{found} frames; expected {frames}"));
+    }
+    Ok([decoder.width().into(), decoder.height().into()])
+}
+
 /// Truth and variants side by side, in a box that holds the subject in every frame.
 fn write_gif(path: &Path, frames: &[DrawnFrame]) -> Result<(), Error> {
     let hull = frames

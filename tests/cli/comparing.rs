@@ -115,6 +115,11 @@ fn pictures_that_both_runs_kept_are_named() {
     assert!(!out.contains("pictures"), "one of the runs has none");
 }
 
+fn kept_gif(desk: &Desk) -> std::path::PathBuf {
+    let kept = crate::program::contents(&desk.path("run/pictures"));
+    kept.into_iter().map(|(path, _)| path).find(|path| path.extension().is_some_and(|e| e == "gif")).unwrap()
+}
+
 /// A page shows the pictures that are there.
 #[test]
 fn a_page_goes_on_without_a_picture_that_is_gone() {
@@ -128,12 +133,37 @@ fn a_page_goes_on_without_a_picture_that_is_gone() {
     assert!(told.out.contains("<html") && told.out.len() < whole.len());
     let name = picture.file_name().unwrap().to_string_lossy().into_owned();
     assert!(told.err.contains(&name) && told.err.contains("not shown"), "{}", told.err);
+    assert!(told.err.matches("expected").count() <= 1, "{}", told.err);
+    assert!(told.out.contains("could not be read and are not shown: <code>"), "the page says which");
+    assert!(!told.out.contains("to keep the page small"));
+}
+
+/// Files beside the results that are no such files, or not there.
+#[test]
+fn a_page_says_what_it_was_made_without() {
+    let desk = finished();
+    desk.ok(args!["run", "tiny.toml", "--out", "run", "--limit", "2", "--images", "-q"]);
+    let whole = desk.ok(args!["report", "run", "--format", "html"]);
+    let gif = kept_gif(&desk);
+    let bytes = std::fs::read(&gif).unwrap();
+    std::fs::write(&gif, &bytes[..bytes.len() / 2]).unwrap();
+    let told = desk.run(args!["report", "run", "--format", "html"]).exits(0, "the others are there");
+    let gifs = |page: &str| page.matches("data:image/gif;base64,").count();
+    assert_eq!(gifs(&told.out) + 1, gifs(&whole), "half of a GIF");
+    assert!(told.out.contains(&*gif.file_name().unwrap().to_string_lossy()), "the page says which");
+    std::fs::remove_file(desk.path("run/frames.jsonl")).unwrap();
+    desk.put("run/curves.csv", "garbage");
+    let page = || desk.run(args!["report", "run", "--format", "html"]);
+    page().refuses(&["curves.csv", "not the CSV that was expected"], "garbage");
+    std::fs::remove_file(desk.path("run/curves.csv")).unwrap();
+    assert!(page().exits(0, "without records").out.contains("there is no <code>frames.jsonl</code>"));
 }
 
 #[test]
 fn what_cannot_be_compared_is_refused_in_one_line() {
     let desk = finished();
     desk.put("begun/frames.jsonl", "");
+    desk.put("f.toml", "[frames]\npsnr = 1\n");
     desk.run(args!["report", "begun"]).refuses(&["results.json", "not there yet"], "a run that is not done");
     for (arguments, parts) in [
         (args!["compare", "run"], ["one run", "expected two"]),
@@ -143,10 +173,22 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
         (args!["compare", "run", "run", "--format", "pdf"], ["pdf", "junit"]),
         (args!["compare", "run", "run", "--save", "pdf=x"], ["pdf=x", "junit"]),
         (args!["compare", "run", "run", "--save", "csv=no/such/folder/x"], ["no/such/folder", ""]),
+        (args!["compare", "run", "run", "--save", "csv=a", "--save", "json=no/such/x"], ["no/such/x", ""]),
+        (args!["compare", "run", "run", "--save", "csv=a", "--save", "csv=b"], ["csv=b", "csv twice"]),
+        (args!["compare", "run", "run", "--save", "csv=a", "--save", "json=./a"], ["json=./a", "file twice"]),
+        (args!["compare", "run", "run", "--save", "csv=-"], ["csv=-", "expected a file"]),
+        (args!["compare", "run", "--against-paper", "--tolerances", "f.toml"], ["f.toml: [frames]", "none"]),
+        (args!["compare", "run", "--against-paper", "--frames", "3"], ["--against-paper", "--frames"]),
+        (args!["report", "run", "--strict"], ["--baseline", "required"]),
+        (args!["report", "run", "--all"], ["--baseline", "required"]),
+        (args!["report", "run", "--frames", "3"], ["--baseline", "required"]),
+        (args!["report", "run", "--tolerance-psnr", "3"], ["--baseline", "required"]),
+        (args!["report", "run", "--tolerances", "f.toml"], ["--baseline", "required"]),
     ] {
         let shown = format!("{arguments:?}");
         desk.run(arguments).refuses(&parts, &shown);
     }
+    assert!(!desk.path("a").exists(), "nothing is written before all can be");
     desk.put("old.json", changed(&desk, |r| r["schema"] = Value::from(2)).to_string());
     desk.run(args!["compare", "old.json", "run"])
         .refuses(&["old.json", "schema: 2", "3 to 4"], "an older schema");

@@ -250,9 +250,18 @@ fn what_is_read_is_not_written_over() {
         args!["compare", "run", "run", "--save", "json=run/frames.jsonl"],
         args!["compare", "run/results.json", "run", "--save", "markdown=run/results.json"],
         args!["run", "tiny.toml", "--limit", "1", "--out", "run", "--html", "tiny.toml"],
-        args!["run", "tiny.toml", "--limit", "1", "--out", "run", "--html", "run/results.json"],
+        args!["report", "run", "--format", "html", "--out", "run/pictures/index.json"],
+        args!["report", "run/results.json", "--format", "html", "--out", "run/../run/curves.csv"],
     ] {
         desk.run(arguments).refuses(&["it is read; expected another file"], "an input as an output");
+    }
+    for (page, part) in [
+        ("run/results.json", "it is written by this run; expected another file"),
+        ("run/tables.md", "it is written by this run; expected another file"),
+        ("run", "it is a folder of this run; expected a file"),
+    ] {
+        let run = args!["run", "tiny.toml", "--limit", "1", "--out", "run", "--html", page];
+        desk.run(run).refuses(&[page, part], "an output as another");
     }
     assert_eq!((tiny, results), (desk.bytes("tiny.toml"), desk.bytes("run/results.json")));
 }
@@ -335,6 +344,10 @@ fn a_run_is_one_page() {
     );
     let none = page(args!["report", "run", "--format", "html", "--images", "none", "--out", "page.html"]);
     assert!(none.len() < with.len() && !none.contains("data:image/jpeg"));
+    for format in [&["--images", "none"][..], &["--images", "key", "--format", "csv"]] {
+        let report = args!["report", "run"].into_iter().chain(format.iter().map(std::ffi::OsString::from));
+        desk.run(report.collect()).refuses(&["--images", "--format html"], "no page");
+    }
     desk.run(args!["run", "tiny.toml", "--images", "some"])
         .refuses(&["some", "none, key, all"], "no such choice");
 }

@@ -1,6 +1,6 @@
 //! What moved between two results documents.
 
-use super::made_up::{results, run, table_7, with_holes};
+use super::made_up::{results, run, table_7, wide_table_7, with_holes};
 use skinsplat::experiment::{FittedOutcome, Outcome, Plan, PoseNoise, Records, Source};
 use skinsplat::report::compare::{
     Changes, Fate, Tolerances, Verdict, against_paper, compare, github, junit, markdown, text,
@@ -51,6 +51,7 @@ fn what_moves_by_more_than_its_tolerance_is_named_with_its_frames() {
     ::error title=table7 regressed::gymnasts/anna/anna-test quaternions: PSNR 20.7500 -> 20.6500 (tolerance 0.005); most in image_0003
     ::error title=reproduce compare::verdict: regressed: 1 regressed, 15 unchanged
     ");
+    assert_eq!(github(&worse.clone().with_frames(0)), github(&worse), "whatever is shown elsewhere");
     let page = markdown(&worse, false);
     assert!(
         page.starts_with(
@@ -276,20 +277,58 @@ fn the_schema_before_is_read_and_earlier_ones_are_refused() {
     }
 }
 
+/// Judged with the tolerances that there are without a word.
+fn paper(results: &Results) -> Changes {
+    against_paper(results, &Tolerances::default())
+}
+
+/// What the paper prints and the results have not: as ids are not known, by its own names.
+#[test]
+fn printed_rows_without_a_counterpart_are_missing() {
+    let missing = |changes: &Changes| -> Vec<String> {
+        let lines = changes.lines.iter().filter(|line| line.fate == Fate::Missing);
+        lines.map(|line| format!("{} {}", line.sequence, line.variant)).collect()
+    };
+    for experiment in [table_7(), wide_table_7()] {
+        let changes = paper(&results(&experiment, run));
+        assert_eq!((missing(&changes), changes.compared), (vec!["anna Quaternion".to_owned()], 2));
+        let mut other = experiment.clone();
+        let rows = &mut other.paper.as_mut().unwrap().rows;
+        rows.iter_mut().for_each(|row| row.sequence = "carla".to_owned());
+        rows.truncate(2);
+        let changes = paper(&results(&other, run));
+        assert_eq!((changes.verdict, changes.compared), (Verdict::Incomplete, 0));
+        assert_eq!(missing(&changes), ["carla Matrix", "carla Quaternion"]);
+        let told = "its sequences are called carla, its variants Matrix, Quaternion";
+        assert!(changes.notes[0].text.ends_with(told), "{:?}", changes.notes);
+        assert!(junit(&changes).contains("missing: the paper has it"));
+    }
+}
+
+#[test]
+fn a_tolerance_takes_the_place_of_the_last_digit() {
+    let with = |tolerance| against_paper(&base(), &Tolerances::each(|_| tolerance)).counts;
+    assert_eq!((with(f64::INFINITY).regressed, with(f64::INFINITY).improved), (0, 0));
+    assert_eq!(with(0.0).unchanged, 0, "no printed number is ours to the last bit");
+}
+
 /// `matrices` is `m` of the paper's table 7.
 #[test]
 fn real_data_is_judged_by_the_printed_digits() {
-    let changes = against_paper(&base());
+    let changes = paper(&base());
     assert!(changes.compared > 0 && changes.counts.regressed + changes.counts.improved > 0, "{changes:?}");
     let line = &changes.lines[0];
     let printed = line.baseline.unwrap();
     assert_eq!(line.tolerance.unwrap(), 0.005, "half of the last of two digits");
+    assert_eq!([&*line.sequence, &line.variant], ["gymnasts/anna/anna-test", "matrices"], "ids");
+    let shown = text(&changes, true);
+    assert!(shown.contains(" Paper ") && shown.contains(" 20.10 "), "its column, its digits: {shown}");
     // Ours moved onto the printed number, and by less than half of its last digit beside it.
     let psnr = |value: f64| {
         let mut results = base();
         let row = &mut results.tables[0].table.rows[0];
         row.cells[0].content = skinsplat_table::Content::Number(value);
-        against_paper(&results).lines[0].fate
+        paper(&results).lines[0].fate
     };
     assert_eq!(psnr(printed), Fate::Unchanged);
     assert_eq!(psnr(printed - 0.0049), Fate::Unchanged);
@@ -298,10 +337,10 @@ fn real_data_is_judged_by_the_printed_digits() {
     let row = &mut spread.tables[0].table.rows[0];
     (row.cells[0].content, row.cells[0].spread) =
         (skinsplat_table::Content::Number(printed - 0.2), Some(0.1));
-    assert_eq!(against_paper(&spread).lines[0].fate, Fate::Unchanged, "within two standard deviations");
+    assert_eq!(paper(&spread).lines[0].fate, Fate::Unchanged, "within two standard deviations");
     let mut stand_in = base();
     stand_in.tables[0].source = Source::StandIn;
-    let changes = against_paper(&stand_in);
+    let changes = paper(&stand_in);
     assert_eq!((changes.verdict, changes.compared), (Verdict::Incomplete, 0));
     assert!(changes.notes[0].text.contains("stand-in data"), "{:?}", changes.notes);
 }

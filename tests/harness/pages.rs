@@ -4,6 +4,7 @@ use super::made_up::{results, run, table_7};
 use image::{Rgb, RgbImage};
 use skinsplat::report::html::{BOUND, Extras, KeptPictures, Stills, frames_that_fit, html};
 use skinsplat::report::{FrameResult, Results};
+use skinsplat_metrics::MetricId;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -96,6 +97,8 @@ fn ten_thousand_frames_are_one_page() {
             ..model.clone()
         };
         variant.frames = (0..FRAMES).map(frame).collect();
+        // A peak in no place of any pattern.
+        variant.frames[4999].score.as_mut().unwrap().values.insert(MetricId::PSNR, 77.0);
         bends.extend(variant.frames.iter().map(|frame| (frame.key.clone(), frame.frame as f64 % 150.0)));
     }
     for frame in &sequence.variants[0].frames {
@@ -106,8 +109,14 @@ fn ten_thousand_frames_are_one_page() {
     let page = html(&results, &Extras { pictures, bends, bound: BOUND, ..Extras::default() });
     eprintln!("{FRAMES} frames: {} bytes in {:.2} s", page.len(), start.elapsed().as_secs_f64());
     assert!(page.len() < 3_000_000 && page.len() < BOUND, "{} bytes", page.len());
-    for every in ["One frame in 7 is drawn.", "One frame in 34 is drawn."] {
-        assert!(page.contains(every), "{every}");
+    for every in [14, 67] {
+        let told = format!("Of every {every} frames the lowest and the highest are drawn.");
+        assert!(page.contains(&told), "{every}");
     }
+    assert!(page.contains("image_04999: 77.000"), "a peak is drawn");
+    // Less room: fewer points, which the page says.
+    let small = html(&results, &Extras { bound: 120_000, ..Extras::default() });
+    assert!(small.len() <= 120_000 && small.contains("Charts have fewer points"), "{}", small.len());
+    assert!(!page.contains("Charts have fewer points"));
     assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
 }

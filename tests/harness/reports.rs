@@ -232,3 +232,16 @@ fn a_variant_is_compared_with_what_it_asks_for() {
         [("Quaternions", "Matrices", 1.0), ("Third", "Matrices", 3.0), ("Third", "Quaternions", 2.0)];
     assert_eq!(compared, each_once);
 }
+
+/// The command of a page is one that a shell reads, and names stay text in it.
+#[test]
+fn the_command_of_a_page_holds_any_name() {
+    let mut results = results(&table_7(), run);
+    results.options.subset.subjects = vec!["it's `a` <b>".to_owned()];
+    let command = r"--subject 'it'\''s `a` <b>'";
+    let page = skinsplat::report::page(&results);
+    assert!(page.contains("Made by ``reproduce run table7") && page.contains(command), "{page}");
+    assert!(page.contains(&format!("{command}``, on the data")), "{page}");
+    let html = skinsplat::report::html::html(&results, &skinsplat::report::html::Extras::default());
+    assert!(html.contains(r"--subject 'it'\''s `a` &lt;b&gt;'</code>. Bold"), "{html}");
+}

@@ -230,12 +230,14 @@ impl Series {
         let placed: Vec<(&Point, [f64; 2])> =
             self.points.iter().filter_map(|point| Some((point, frame.place(point)?))).collect();
         let path: Vec<String> = placed.iter().map(|(_, [x, y])| format!("{},{}", n(*x), n(*y))).collect();
-        // A mark per point is too much where there are thousands: the line has them all.
+        // A mark per point is too much where there are thousands: the line has them all, and marks those that lead somewhere.
         let marks = placed.len() <= 400 || kind == Kind::Scatter;
         html! {
             g class=(class(index)) {
                 @if kind == Kind::Lines && placed.len() > 1 { polyline points=(path.join(" ")) {} }
-                @if marks { @for (point, at) in &placed { (self.mark(point, *at, kind)) } }
+                @for (point, at) in &placed {
+                    @if marks || point.picture.is_some() { (self.mark(point, *at, kind)) }
+                }
             }
         }
     }
@@ -311,8 +313,13 @@ mod tests {
 
     #[test]
     fn ten_thousand_points_stay_small() {
-        let points = (0..10_000).map(|i| Point::new(f64::from(i), f64::from(i % 7))).collect();
+        let point = |i: i32| match Point::new(f64::from(i), f64::from(i % 7)) {
+            point if i % 1000 == 0 => point.to("lab", i.to_string()),
+            point => point,
+        };
+        let points = (0..10_000).map(point).collect();
         let html = Chart::lines("T", "x", "y").with(Series::new("a", points)).markup("s").into_string();
         assert!(html.len() < 250_000, "{}", html.len());
+        assert_eq!(html.matches("<a ").count(), 10, "those with pictures lead there");
     }
 }

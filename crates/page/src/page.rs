@@ -188,16 +188,33 @@ fn switched(views: &[(String, Chart)], at: &str) -> Markup {
     }
 }
 
-/// Text in which a pair of backticks marks code.
+/// Text in which code stands between backticks, as many before it as after it.
 pub(crate) fn prose(text: &str) -> Markup {
-    let spans: Vec<&str> = text.split('`').collect();
-    let paired = spans.len() % 2 == 1;
     html! {
-        @if paired {
-            @for (i, span) in spans.iter().enumerate() {
-                @if i % 2 == 1 { code { (span) } } @else { (span) }
+        @match code(text) {
+            Some((before, code, after)) => { (before) code { (code) } (prose(after)) },
+            None => { (text) },
+        }
+    }
+}
+
+/// The first code in a text, and what is around it.
+fn code(text: &str) -> Option<(&str, &str, &str)> {
+    let run = |at: usize| text[at..].bytes().take_while(|&byte| byte == b'`').count();
+    let mut open = text.find('`')?;
+    loop {
+        let fence = run(open);
+        let begin = open + fence;
+        let mut close = begin;
+        while let Some(found) = text[close..].find('`').map(|at| close + at) {
+            if run(found) == fence {
+                let inner = &text[begin..found];
+                let padded = inner.strip_prefix(' ').and_then(|inner| inner.strip_suffix(' '));
+                return Some((&text[..open], padded.unwrap_or(inner), &text[found + fence..]));
             }
-        } @else { (text) }
+            close = found + run(found);
+        }
+        open = begin + text[begin..].find('`')?;
     }
 }
 
@@ -265,5 +282,7 @@ mod tests {
     fn backticks_mark_code_in_pairs() {
         assert_eq!(prose("a `b<` c").into_string(), "a <code>b&lt;</code> c");
         assert_eq!(prose("a ` c").into_string(), "a ` c");
+        assert_eq!(prose("``a`b`` and `` `c` ``").into_string(), "<code>a`b</code> and <code>`c`</code>");
+        assert_eq!(prose("``a` b `c`").into_string(), "``a<code>b</code>c`");
     }
 }

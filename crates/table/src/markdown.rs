@@ -95,6 +95,16 @@ pub fn prose(text: &str) -> String {
     spans(text).iter().map(part).collect()
 }
 
+/// Text as code, whatever it holds: between more backticks than it has in a row.
+pub fn code_span(text: &str) -> String {
+    let longest = text.split(|c| c != '`').map(str::len).max().unwrap_or_default();
+    let fence = "`".repeat(longest + 1);
+    match text.starts_with('`') || text.ends_with('`') {
+        true => format!("{fence} {text} {fence}"),
+        false => format!("{fence}{text}{fence}"),
+    }
+}
+
 /// Text that Markdown shows as it is, on one line.
 pub fn escape(text: &str) -> String {
     let text = visible(text);
@@ -124,6 +134,13 @@ mod tests {
         assert_eq!(escape("a|b*c`<d>\n"), "a\\|b\\*c\\`&lt;d> ");
         assert_eq!(escape("_a_ image_0001 ![x](y) [0, 1]"), "\\_a\\_ image_0001 ![x\\](y) [0, 1]");
         assert_eq!(prose("`power-N|*` of *"), "`power-N|*` of \\*");
+    }
+
+    #[test]
+    fn code_holds_backticks() {
+        for (text, code) in [("a", "`a`"), ("a`b", "``a`b``"), ("``a", "``` ``a ```")] {
+            assert_eq!(code_span(text), code);
+        }
     }
 
     #[test]

@@ -3,14 +3,11 @@
 //! <https://docs.github.com/en/actions/reference/workflow-commands-for-github-actions>
 
 use super::tables::finer;
-use super::{Changes, Fate, Line};
-use skinsplat_metrics::MetricId;
-use skinsplat_table::visible;
+use super::{Changes, Fate, Line, NAMED_FRAMES};
+use skinsplat_table::{Digits, visible};
 
 /// Annotations of one level that GitHub shows per step.
 const SHOWN: usize = 10;
-/// Frames that an annotation names.
-const FRAMES: usize = 3;
 
 /// The annotations: an error per regression or loss, a notice per improvement, a warning per note, and the verdict.
 pub fn github(changes: &Changes) -> String {
@@ -21,7 +18,7 @@ pub fn github(changes: &Changes) -> String {
         // One place is for the verdict, one for what is left out.
         let fit = if lines.len() < SHOWN { lines.len() } else { SHOWN - 2 };
         for line in &lines[..fit] {
-            text += &command(level, &title(line), &message(changes, line));
+            text += &command(level, &title(line), &message(line));
         }
         if lines.len() > fit {
             text += &command(level, "reproduce compare", &format!("{} more like these", lines.len() - fit));
@@ -38,31 +35,33 @@ fn title(line: &Line) -> String {
     format!("{} {}", line.table, line.fate.id())
 }
 
-fn message(changes: &Changes, line: &Line) -> String {
+fn message(line: &Line) -> String {
     let at = format!("{} {}", line.sequence, line.variant);
     let Some(metric) = line.metric else {
         return match line.frames.as_slice() {
             [] => format!("{at}: all of it"),
             frames => {
-                format!("{at}: {} frames, {}", frames.len(), frames[..frames.len().min(FRAMES)].join(", "))
+                format!(
+                    "{at}: {} frames, {}",
+                    frames.len(),
+                    frames[..frames.len().min(NAMED_FRAMES)].join(", ")
+                )
             }
         };
     };
-    let shown =
-        |value: Option<f64>| value.map_or_else(|| "nothing".to_owned(), |value| finer(metric).show(value));
-    let numbers = format!("{} {} -> {}", line.title(), shown(line.baseline), shown(line.current));
+    let shown = |value: Option<f64>, digits: Digits| {
+        value.map_or_else(|| "nothing".to_owned(), |value| digits.show(value))
+    };
+    let (before, after) = (line.digits_before(metric), finer(metric));
+    let numbers =
+        format!("{} {} -> {}", line.title(), shown(line.baseline, before), shown(line.current, after));
     let tolerance = line.tolerance.map_or_else(String::new, |t| format!(" (tolerance {t})"));
-    format!("{at}: {numbers}{tolerance}{}", frames(changes, line, metric))
+    format!("{at}: {numbers}{tolerance}{}", frames(line))
 }
 
 /// The frames behind a movement.
-fn frames(changes: &Changes, line: &Line, metric: MetricId) -> String {
-    let of_line = changes.frames.iter().filter(|m| {
-        (m.metric, m.fitted) == (metric, line.fitted)
-            && [&m.table, &m.sequence, &m.variant] == [&line.table, &line.sequence, &line.variant]
-    });
-    let names: Vec<&str> = of_line.take(FRAMES).map(|m| m.frame.as_str()).collect();
-    if names.is_empty() { String::new() } else { format!("; most in {}", names.join(", ")) }
+fn frames(line: &Line) -> String {
+    if line.moved.is_empty() { String::new() } else { format!("; most in {}", line.moved.join(", ")) }
 }
 
 /// A workflow command: what it says ends no line, starts no other command and moves no cursor.

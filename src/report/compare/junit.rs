@@ -4,6 +4,7 @@ use super::tables::finer;
 use super::{Changes, Fate, Line};
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use skinsplat_metrics::MetricId;
+use skinsplat_table::Digits;
 
 /// The suite of what was not compared.
 const NOTES: &str = "not compared";
@@ -45,7 +46,7 @@ fn case(changes: &Changes, line: &Line) -> TestCase {
         if line.frames.is_empty() { String::new() } else { format!(" [{}]", line.frames.join(", ")) };
     let name = format!("{} {} {metric}{frames}", line.sequence, line.variant);
     let status = match line.fate {
-        Fate::Missing => failed(NonSuccessKind::Error, "missing: the baseline has it".to_owned()),
+        Fate::Missing => failed(NonSuccessKind::Error, format!("missing: the {} has it", changes.against())),
         _ if changes.is_bad(line) => failed(NonSuccessKind::Failure, numbers(line)),
         _ => TestCaseStatus::success(),
     };
@@ -61,10 +62,11 @@ fn failed(kind: NonSuccessKind, message: String) -> TestCaseStatus {
 }
 
 fn numbers(line: &Line) -> String {
-    let shown = |value: Option<f64>| match (value, line.metric) {
-        (Some(value), Some(metric)) => finer(metric).show(value),
-        _ => "none".to_owned(),
+    let Some(metric) = line.metric else { return "none".to_owned() };
+    let shown = |value: Option<f64>, digits: Digits| {
+        value.map_or_else(|| "none".to_owned(), |value| digits.show(value))
     };
+    let (before, after) = (line.digits_before(metric), finer(metric));
     let tolerance = line.tolerance.unwrap_or_default();
-    format!("{} -> {} (tolerance {tolerance})", shown(line.baseline), shown(line.current))
+    format!("{} -> {} (tolerance {tolerance})", shown(line.baseline, before), shown(line.current, after))
 }

@@ -27,9 +27,14 @@ use super::results::Results;
 use comparable::comparable;
 use serde::{Deserialize, Serialize};
 use skinsplat_metrics::MetricId;
+use skinsplat_table::Digits;
+use std::collections::BTreeMap;
 
 /// Version of the format of a comparison as JSON.
 pub const SCHEMA: u32 = 1;
+
+/// Frames that are named behind a number.
+const NAMED_FRAMES: usize = 3;
 
 /// The outcome of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -108,9 +113,9 @@ impl Fate {
 pub struct Line {
     /// Id of the experiment.
     pub table: String,
-    /// `dataset/subject/sequence`; what a mean is called, if it is one.
+    /// `dataset/subject/sequence`; what a mean is called, if it is one, and what the paper calls one that is missing.
     pub sequence: String,
-    /// Id of the variant.
+    /// Id of the variant; what the paper calls one that is missing.
     pub variant: String,
     /// The metric; none where all of them are missing or new.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -121,6 +126,9 @@ pub struct Line {
     /// In the baseline; infinite is `null` in JSON.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<f64>,
+    /// Digits after the point of a baseline that is printed in the paper.
+    #[serde(skip)]
+    pub printed: Option<usize>,
     /// In the current results; infinite is `null` in JSON.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub current: Option<f64>,
@@ -129,6 +137,9 @@ pub struct Line {
     pub tolerance: Option<f64>,
     /// What became of it.
     pub fate: Fate,
+    /// The frames behind a number that moved, the farthest first.
+    #[serde(skip)]
+    pub moved: Vec<String>,
     /// Frames of which that is said, where it is not said of the whole sequence.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frames: Vec<String>,
@@ -140,6 +151,29 @@ fn titled(title: &str, fitted: bool) -> String {
 }
 
 impl Line {
+    /// A line on all of a sequence and variant, without a number.
+    fn new(table: &str, [sequence, variant]: [String; 2], fate: Fate) -> Self {
+        Self {
+            table: table.to_owned(),
+            sequence,
+            variant,
+            metric: None,
+            fitted: false,
+            baseline: None,
+            printed: None,
+            current: None,
+            tolerance: None,
+            fate,
+            moved: Vec::new(),
+            frames: Vec::new(),
+        }
+    }
+
+    /// With how many digits its baseline is shown: a printed one as it was printed.
+    fn digits_before(&self, metric: MetricId) -> Digits {
+        self.printed.map_or_else(|| tables::finer(metric), Digits::Decimals)
+    }
+
     /// What its number is called.
     pub(super) fn title(&self) -> String {
         titled(self.metric.map_or("all", MetricId::title), self.fitted)
@@ -212,6 +246,9 @@ pub struct Changes {
     pub verdict: Verdict,
     /// Whether what got better counts as a regression.
     pub strict: bool,
+    /// Whether the baseline is what the paper prints.
+    #[serde(skip)]
+    pub paper: bool,
     /// Sequences and variants that were compared.
     pub compared: usize,
     /// Numbers by their fate.
@@ -233,11 +270,7 @@ pub struct Changes {
 /// Left out with a note: tables of another protocol or version, sequences of other data.
 pub fn compare(baseline: &Results, current: &Results, tolerances: &Tolerances) -> Changes {
     let mut changes = Changes::default();
-    let known = |id: &String| baseline.tables.iter().chain(&current.tables).any(|t| t.experiment == *id);
-    for id in tolerances.tables.keys().filter(|id| !known(id)) {
-        let text = format!("tolerances: [tables.{id}]: neither run has this table");
-        changes.notes.push(Note { left_out: false, text });
-    }
+    tolerances.note_unknown(&[baseline, current], &mut changes.notes);
     let pairs = comparable(baseline, current, &mut changes.notes);
     for pair in &pairs.both {
         pair.compare(tolerances, &mut changes);
@@ -256,6 +289,7 @@ impl Default for Changes {
             schema: SCHEMA,
             verdict: Verdict::Incomplete,
             strict: false,
+            paper: false,
             compared: 0,
             counts: Counts::default(),
             notes: Vec::new(),
@@ -284,6 +318,7 @@ impl Changes {
             let by_tolerances = b.tolerances.total_cmp(&a.tolerances);
             b.worse.cmp(&a.worse).then(by_tolerances).then_with(|| size(b).total_cmp(&size(a)))
         });
+        self.name_frames();
         let left_out = self.notes.iter().any(|note| note.left_out);
         self.verdict = match self.counts {
             Counts { regressed: 1.., .. } => Verdict::Regressed,
@@ -293,6 +328,25 @@ impl Changes {
             _ => Verdict::Unchanged,
         };
         self
+    }
+
+    /// Names the frames behind every number, of all that moved: who shows fewer still has them.
+    fn name_frames(&mut self) {
+        let mut by_number: BTreeMap<_, Vec<&String>> = BTreeMap::new();
+        for m in &self.frames {
+            let number = ([&m.table, &m.sequence, &m.variant], m.metric, m.fitted, m.worse);
+            let names = by_number.entry(number).or_default();
+            if names.len() < NAMED_FRAMES {
+                names.push(&m.frame);
+            }
+        }
+        for line in &mut self.lines {
+            let (Some(metric), at) = (line.metric, [&line.table, &line.sequence, &line.variant]) else {
+                continue;
+            };
+            let names = by_number.get(&(at, metric, line.fitted, line.fate == Fate::Regressed));
+            line.moved = names.into_iter().flatten().map(|name| (*name).clone()).collect();
+        }
     }
 
     /// The comparison judged so that a number that got better by more than its tolerance counts too: for a program whose numbers
@@ -317,6 +371,11 @@ impl Changes {
             Fate::Improved => self.strict,
             Fate::Unchanged | Fate::New => false,
         }
+    }
+
+    /// What the current results are held against.
+    fn against(&self) -> &'static str {
+        if self.paper { "paper" } else { "baseline" }
     }
 
     /// The comparison with so many frames at most.

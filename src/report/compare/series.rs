@@ -23,18 +23,7 @@ pub(super) struct Pair<'a> {
 impl<'a> Series<'a> {
     /// A line on all of it, without a number.
     pub(super) fn line(&self, fate: Fate) -> Line {
-        Line {
-            table: self.table.experiment.clone(),
-            sequence: self.sequence.id.clone(),
-            variant: self.variant.id.clone(),
-            metric: None,
-            fitted: false,
-            baseline: None,
-            current: None,
-            tolerance: None,
-            fate,
-            frames: Vec::new(),
-        }
+        Line::new(&self.table.experiment, [self.sequence.id.clone(), self.variant.id.clone()], fate)
     }
 
     /// The scored frames by name; of frames of one name (of several cameras, say) the second is `NAME (2)`.

@@ -21,7 +21,7 @@ pub fn verdicts(changes: &Changes, wanted: impl Fn(Fate) -> bool) -> Table {
         labels: labels(&[("metric", "Metric")]),
         columns: vec![
             Column::text("verdict", "Verdict"),
-            Column::new("baseline", "Baseline").digits(Digits::Exact),
+            Column::new("baseline", if changes.paper { "Paper" } else { "Baseline" }).digits(Digits::Exact),
             Column::new("current", "Current").digits(Digits::Exact),
             Column::new("change", "Change").digits(Digits::Exact),
             Column::new("tolerance", "Tolerance").digits(Digits::Exact),
@@ -36,16 +36,16 @@ pub fn verdicts(changes: &Changes, wanted: impl Fn(Fate) -> bool) -> Table {
 fn verdict(index: usize, line: &Line) -> Row {
     let metric = line.title();
     let labels = [line.table.as_str(), &line.sequence, &line.variant, &metric];
-    let number = |value: Option<f64>| match (line.metric, value) {
-        (Some(metric), Some(value)) => Cell::number(value, finer(metric)),
+    let number = |value: Option<f64>, digits: &dyn Fn(MetricId) -> Digits| match (line.metric, value) {
+        (Some(metric), Some(value)) => Cell::number(value, digits(metric)),
         _ => Cell::empty(),
     };
     let change = line.metric.zip(line.baseline.zip(line.current));
     let tolerance = line.tolerance.filter(|_| line.fate != Fate::Missing && line.fate != Fate::New);
     let cells = vec![
         Cell::text(line.fate.id()),
-        number(line.baseline),
-        number(line.current),
+        number(line.baseline, &|metric| line.digits_before(metric)),
+        number(line.current, &finer),
         change.map_or_else(Cell::empty, |(metric, (a, b))| difference(metric, a, b)),
         tolerance.map_or_else(Cell::empty, |t| Cell::number(t, Digits::Shortest(4))),
         if line.frames.is_empty() { Cell::text("") } else { Cell::text(named(&line.frames)) },

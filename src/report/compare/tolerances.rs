@@ -1,5 +1,7 @@
 //! How far numbers may move: by metric, and by table where a file says so.
 
+use super::Note;
+use crate::report::results::Results;
 use crate::toml_problem::TomlProblem;
 use serde::Deserialize;
 use skinsplat_metrics::MetricId;
@@ -73,10 +75,25 @@ impl Tolerances {
 
     /// How far an aggregate may move.
     pub(super) fn of(&self, table: &str, metric: MetricId) -> f64 {
+        self.given(table, metric).unwrap_or_else(|| metric.metric().tolerance)
+    }
+
+    /// How far an aggregate may move, if somebody said so.
+    pub(super) fn given(&self, table: &str, metric: MetricId) -> Option<f64> {
         let own = self.tables.get(table);
         let sets = [Some(&self.asked), own, Some(&self.all)];
-        let found = sets.into_iter().flatten().find_map(|set| set.0.get(&metric));
-        found.copied().unwrap_or_else(|| metric.metric().tolerance)
+        sets.into_iter().flatten().find_map(|set| set.0.get(&metric)).copied()
+    }
+
+    /// Notes the tables that no run has.
+    pub(super) fn note_unknown(&self, runs: &[&Results], notes: &mut Vec<Note>) {
+        let known = |id: &String| runs.iter().flat_map(|run| &run.tables).any(|t| t.experiment == *id);
+        let who = if runs.len() == 1 { "the run does not have" } else { "neither run has" };
+        let unknown = self.tables.keys().filter(|id| !known(id));
+        notes.extend(unknown.map(|id| {
+            let text = format!("tolerances: [tables.{id}]: {who} this table");
+            Note { left_out: false, text }
+        }));
     }
 
     /// How far a single frame may move, if that is bounded.

@@ -1,6 +1,6 @@
 //! Scores over frames, and fits over their iterations, as charts.
 
-use super::pictures::Links;
+use super::pictures::{Budget, KeptPictures, Links};
 use crate::experiment::Shown;
 use crate::report::results::{FrameResult, SequenceResults, TableResults, VariantResults};
 use skinsplat_metrics::MetricId;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// Charts that stand open; more are folded.
 const OPEN: usize = 4;
-/// Points of a line; of longer sequences every n-th frame is drawn.
+/// Points of a line; of longer sequences the extremes of every so many frames are drawn.
 const POINTS: usize = 1500;
 
 /// Points of a series over the bend, each of which is drawn by itself.
@@ -22,9 +22,11 @@ const VIEWS: [&str; 2] = ["over frames", "over bend"];
 /// A chart per sequence and metric that the table shows: over frames and, where it is known, over how far the body is bent.
 pub(super) fn over_frames(
     results: &TableResults,
-    links: &Links<'_>,
+    budget: &Budget,
+    pictures: &KeptPictures,
     bends: &BTreeMap<String, f64>,
 ) -> Vec<Part> {
+    let links = &budget.links(pictures);
     let has = |key: &str| results.table.columns.iter().any(|column| column.key == key);
     let of = |metric: MetricId| [false, true].map(|fitted| Shown { metric, fitted });
     let asked = |shown: &Shown| match shown.fitted {
@@ -34,7 +36,7 @@ pub(super) fn over_frames(
     let scores: Vec<Shown> = MetricId::of_frames().flat_map(of).filter(asked).collect();
     let mut charts: Vec<Part> = Vec::new();
     for sequence in &results.sequences {
-        let of = Charted { results, sequence, links, bends };
+        let of = Charted { results, sequence, budget, links, bends };
         charts.extend(scores.iter().filter_map(|&shown| of.part(shown, scores.iter().any(|s| s.fitted))));
     }
     if charts.len() > OPEN {
@@ -48,6 +50,7 @@ pub(super) fn over_frames(
 struct Charted<'a> {
     results: &'a TableResults,
     sequence: &'a SequenceResults,
+    budget: &'a Budget,
     links: &'a Links<'a>,
     bends: &'a BTreeMap<String, f64>,
 }
@@ -76,7 +79,7 @@ impl Charted<'_> {
         })
     }
 
-    /// A chart with a series per variant, of at most so many frames; none without a point.
+    /// A chart with a series per variant, of at most so many frames and those that have pictures; none without a point.
     fn filled(
         &self,
         mut chart: Chart,
@@ -86,25 +89,45 @@ impl Charted<'_> {
     ) -> Option<Chart> {
         let variants = &self.sequence.variants;
         let longest = variants.iter().map(|variant| variant.frames.len()).max()?;
-        let every = longest.div_ceil(most).max(1);
+        let most = self.budget.points(most);
+        // Two of each: a line through every n-th would have no peak.
+        let every = if longest <= most { 1 } else { longest.div_ceil(most / 2) };
+        let mut any = false;
+        let mut hollow = false;
+        for variant in variants {
+            let known: Vec<(&FrameResult, f64, f64)> = (variant.frames.iter())
+                .filter_map(|frame| Some((frame, x(frame)?, frame.value(shown)?)))
+                .collect();
+            let drawn: Vec<_> = if every == 1 { known } else { self.extremes(&known, every) };
+            any |= !drawn.is_empty();
+            let marked = drawn.len() <= MARKED;
+            hollow |= marked && drawn.iter().any(|(frame, ..)| self.shown(frame) == Some(false));
+            let points = drawn.into_iter().map(|(frame, x, y)| self.point(variant, frame, shown, [x, y]));
+            chart = chart.with(Series::new(&variant.label, points.collect()));
+        }
         let mut notes: Vec<String> = Vec::new();
         if every > 1 {
-            notes.push(format!("One frame in {every} is drawn."));
+            notes.push(format!("Of every {every} frames the lowest and the highest are drawn."));
         }
-        let drawn = || variants.iter().flat_map(|variant| variant.frames.iter().step_by(every));
-        if longest.div_ceil(every) <= MARKED && drawn().any(|frame| self.shown(frame) == Some(false)) {
+        if hollow {
             notes.push("Pictures of hollow points were left out to keep the page small.".to_owned());
         }
-        chart = chart.note(notes.join(" "));
-        let mut any = false;
-        for variant in variants {
-            let frames = variant.frames.iter().step_by(every);
-            let point = |frame: &FrameResult| self.point(variant, frame, shown, x(frame)?);
-            let points: Vec<Point> = frames.filter_map(point).collect();
-            any |= !points.is_empty();
-            chart = chart.with(Series::new(&variant.label, points));
-        }
-        any.then_some(chart)
+        any.then(|| chart.note(notes.join(" ")))
+    }
+
+    /// Of every so many frames the lowest, the highest and those whose pictures are on the page.
+    fn extremes<'f>(
+        &self,
+        known: &[(&'f FrameResult, f64, f64)],
+        every: usize,
+    ) -> Vec<(&'f FrameResult, f64, f64)> {
+        let of_bin = |bin: &[(&'f FrameResult, f64, f64)]| {
+            let by_value = |a: &usize, b: &usize| bin[*a].2.total_cmp(&bin[*b].2);
+            let ends = [(0..bin.len()).min_by(by_value), (0..bin.len()).max_by(by_value)];
+            let kept = |i: &usize| ends.contains(&Some(*i)) || self.shown(bin[*i].0) == Some(true);
+            (0..bin.len()).filter(kept).map(|i| bin[i]).collect::<Vec<_>>()
+        };
+        known.chunks(every).flat_map(of_bin).collect()
     }
 
     /// Whether the page has pictures of a frame; none if the run kept none.
@@ -113,16 +136,21 @@ impl Charted<'_> {
     }
 
     /// The score of a frame, which leads to its pictures where the page has them.
-    fn point(&self, variant: &VariantResults, frame: &FrameResult, shown: Shown, x: f64) -> Option<Point> {
-        let value = frame.value(shown)?;
+    fn point(
+        &self,
+        variant: &VariantResults,
+        frame: &FrameResult,
+        shown: Shown,
+        [x, value]: [f64; 2],
+    ) -> Point {
         let digits = shown.metric.decimals() + 1;
         let point =
             Point::new(x, value).titled(format!("{}, {}: {value:.digits$}", variant.label, frame.name));
-        Some(match self.shown(frame) {
+        match self.shown(frame) {
             Some(true) => point.to(&self.sequence.label, &frame.name),
             Some(false) => point.without_picture("its picture was left out to keep the page small"),
             None => point,
-        })
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use crate::experiment::Source;
 use pictures::Budget;
 use skinsplat_page::{Page, Part, Section};
 use skinsplat_table::Table;
+use skinsplat_table::markdown::code_span;
 use std::collections::BTreeMap;
 
 /// What a page may hold beside the results.
@@ -25,6 +26,8 @@ pub struct Extras {
     pub curves: String,
     /// Further tables, each at the end of the page: where the time went.
     pub tables: Vec<Table>,
+    /// Whether there were records beside the results, for times and bends.
+    pub recorded: bool,
     /// Most bytes of the page.
     pub bound: usize,
 }
@@ -36,10 +39,12 @@ pub const BOUND: usize = 15_000_000;
 pub fn html(results: &Results, extras: &Extras) -> String {
     let pictures = &extras.pictures;
     // Where not all were read, so many were as fit in the smallest size.
+    let thinned = thinned(results, extras);
     let mut budget = match pictures.stills.len() {
         read if read < pictures.kept => Budget::smallest(pictures, read),
         _ => Budget::new(pictures),
     };
+    budget = budget.thinned(thinned);
     let page = page(results, extras, &budget);
     let mut html = page.html();
     // Smaller pictures, then fewer, until it fits.
@@ -53,8 +58,9 @@ pub fn html(results: &Results, extras: &Extras) -> String {
 /// all. Who has thousands of frames reads so many and no more.
 pub fn frames_that_fit(results: &Results, extras: &Extras, kept: usize) -> usize {
     let sample = extras.pictures.stills.len();
+    let thinned = thinned(results, extras);
     let bytes = |frames: usize| {
-        let budget = Budget::smallest(&extras.pictures, frames);
+        let budget = Budget::smallest(&extras.pictures, frames).thinned(thinned);
         page(results, extras, &budget).html().len()
     };
     let rest = bytes(0);
@@ -62,6 +68,17 @@ pub fn frames_that_fit(results: &Results, extras: &Extras, kept: usize) -> usize
     let room = SAFE * extras.bound.saturating_sub(rest) as f64;
     if each > 0.0 { kept.min((room / each) as usize) } else { kept }
 }
+
+/// How many times charts lose half of their points, so that the page stays within its bound without pictures, and within half of it
+/// if there are some.
+fn thinned(results: &Results, extras: &Extras) -> u32 {
+    let room = if extras.pictures.is_empty() { extras.bound } else { extras.bound / 2 };
+    let fits = |thinned: &u32| page(results, extras, &Budget::none().thinned(*thinned)).html().len() <= room;
+    (0..MOST_THINNED).find(fits).unwrap_or(MOST_THINNED)
+}
+
+/// From here on charts have two points a line.
+const MOST_THINNED: u32 = 10;
 
 /// The part of the room that pictures are chosen for: those that were not looked at may be larger.
 const SAFE: f64 = 0.9;
@@ -73,11 +90,11 @@ fn page(results: &Results, extras: &Extras, budget: &Budget) -> Page {
         _ => "Results".to_owned(),
     });
     page = page.lead(format!(
-        "Made by `{}`. Bold is the best value of a sequence, with everything that the frames do not decide to be worse: where \
+        "Made by {}. Bold is the best value of a sequence, with everything that the frames do not decide to be worse: where \
          they are too few to decide anything, all of it. Counts are bold only where they are what the table is about. ↑: more is \
          better, ↓: less is better; n/c: not computed. Headings sort; whoever points at a number sees all of its digits, or its \
          interval.",
-        super::page::command(results)
+        code_span(&super::page::command(results))
     ));
     let code = results.code;
     page = page.lead(format!(
@@ -95,6 +112,9 @@ fn page(results: &Results, extras: &Extras, budget: &Budget) -> Page {
     if extras.tables.is_empty() { page } else { page.section(rest) }
 }
 
+/// Lost pictures that are named; others are counted.
+const NAMED: usize = 5;
+
 /// What a reader must not miss.
 fn warnings(results: &Results, extras: &Extras, budget: &Budget) -> Vec<String> {
     let mut texts = Vec::new();
@@ -109,13 +129,25 @@ fn warnings(results: &Results, extras: &Extras, budget: &Budget) -> Vec<String> 
     }
     let empty = results.tables.iter().filter(|table| table.table.rows.is_empty());
     texts.extend(empty.map(|table| format!("{}: not run, no data for it.", table.table.title)));
-    if extras.pictures.is_empty() {
+    if !extras.pictures.lost.is_empty() {
+        let lost = &extras.pictures.lost;
+        let named: Vec<String> = lost.iter().take(NAMED).map(|name| code_span(name)).collect();
+        let more = match lost.len() - named.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let what = "Pictures that the run kept could not be read and are not shown";
+        texts.push(format!("{what}: {}{more}.", named.join("; ")));
+    } else if extras.pictures.is_empty() {
         texts.push(
             "Without pictures: the run kept none (`reproduce run --html FILE --images key|all` keeps them)."
                 .to_owned(),
         );
     }
     texts.extend(budget.says(extras.bound));
+    if !extras.recorded {
+        texts.push("Without bytes and times, and charts over the bend: there is no `frames.jsonl` beside the results.".to_owned());
+    }
     texts
 }
 
@@ -137,7 +169,7 @@ fn section(results: &TableResults, extras: &Extras, budget: &Budget) -> Section 
         section.push(Part::Aside(paper));
     }
     let viewer = budget.viewer(results, &extras.pictures);
-    for part in charts::over_frames(results, &budget.links(&extras.pictures), &extras.bends) {
+    for part in charts::over_frames(results, budget, &extras.pictures, &extras.bends) {
         section.push(part);
     }
     if let Some(viewer) = viewer {

@@ -19,6 +19,8 @@ pub struct KeptPictures {
     pub moving: Vec<MovingPicture>,
     /// Of how many frames the run kept pictures, if those of some were not read.
     pub kept: usize,
+    /// What of they were kept and cannot be read any more: names of frames and files.
+    pub lost: Vec<String>,
     /// Frames whose pictures were kept and not read: table, sequence, frame, as in [`Stills`].
     pub unread: Vec<[String; 3]>,
 }
@@ -79,6 +81,8 @@ pub(super) struct Budget {
     of: usize,
     kept: usize,
     moving: usize,
+    /// How many times charts have half of their points.
+    thinned: u32,
 }
 
 /// Longer sides, the largest first.
@@ -92,7 +96,23 @@ impl Budget {
             of: pictures.stills.len(),
             kept: pictures.kept.max(pictures.stills.len()),
             moving: pictures.moving.len(),
+            thinned: 0,
         }
+    }
+
+    /// No picture.
+    pub(super) fn none() -> Self {
+        Self::new(&KeptPictures::default())
+    }
+
+    /// With charts that have half of their points so many times.
+    pub(super) fn thinned(self, thinned: u32) -> Self {
+        Self { thinned, ..self }
+    }
+
+    /// How many of so many points charts may have.
+    pub(super) fn points(&self, most: usize) -> usize {
+        (most >> self.thinned).max(2)
     }
 
     /// The smallest pictures of so many frames, and all moving ones.
@@ -115,7 +135,15 @@ impl Budget {
     }
 
     /// What was given up.
-    pub(super) fn says(&self, bound: usize) -> Option<String> {
+    pub(super) fn says(&self, bound: usize) -> Vec<String> {
+        let thinned = (self.thinned > 0).then(|| {
+            let megabytes = bound as f64 / 1e6;
+            format!("Charts have fewer points, so that the page stays below {megabytes} MB; they say which.")
+        });
+        self.says_of_pictures(bound).into_iter().chain(thinned).collect()
+    }
+
+    fn says_of_pictures(&self, bound: usize) -> Option<String> {
         let megabytes = bound as f64 / 1e6;
         if self.frames < self.kept {
             let (frames, of) = (self.frames, self.kept);

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 /// A word that bash reads as this argument, whatever it holds, on one line. Bytes that are no text, and characters that a
 /// terminal obeys, become escapes.
-pub(super) fn quoted(argument: &OsStr) -> String {
+pub fn quoted(argument: &OsStr) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_./:=,+@%-".contains(c);
     match argument.to_str() {
         Some(text) if !text.is_empty() && text.chars().all(plain) => text.to_owned(),
