@@ -56,9 +56,13 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images, context: Co
     };
     let tables = timing::costs(results, &records, measured.as_ref()).into_iter().collect();
     let bends = records.into_values().filter_map(|record| Some((record.key, record.bend?))).collect();
-    let recorded = !stores.is_empty();
+    let absent = [
+        (stores.is_empty(), "`frames.jsonl` (bytes and times, charts over the bend)"),
+        (!folder.join("run.json").is_file(), "`run.json` (who made them, when and how)"),
+    ];
+    let absent = absent.iter().filter(|(gone, _)| *gone).map(|(_, file)| (*file).to_owned()).collect();
     let mut extras =
-        Extras { pictures: KeptPictures::default(), bends, curves, tables, recorded, bound: BOUND };
+        Extras { pictures: KeptPictures::default(), bends, curves, tables, absent, bound: BOUND };
     let pictures = folder.join(PICTURES);
     let Some(mut index) = index(&pictures, images)? else { return Ok(html(results, &extras)) };
     // The run may have tables that the page has not.

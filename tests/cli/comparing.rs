@@ -156,7 +156,12 @@ fn a_page_says_what_it_was_made_without() {
     let page = || desk.run(args!["report", "run", "--format", "html"]);
     page().refuses(&["curves.csv", "not the CSV that was expected"], "garbage");
     std::fs::remove_file(desk.path("run/curves.csv")).unwrap();
-    assert!(page().exits(0, "without records").out.contains("there is no <code>frames.jsonl</code>"));
+    assert!(
+        page()
+            .exits(0, "without records")
+            .out
+            .contains("Not beside the results: <code>frames.jsonl</code> (bytes")
+    );
 }
 
 #[test]

@@ -26,8 +26,8 @@ pub struct Extras {
     pub curves: String,
     /// Further tables, each at the end of the page: where the time went.
     pub tables: Vec<Table>,
-    /// Whether there were records beside the results, for times and bends.
-    pub recorded: bool,
+    /// Files of a run's folder that are not there, and what the page has not because of them.
+    pub absent: Vec<String>,
     /// Most bytes of the page.
     pub bound: usize,
 }
@@ -145,8 +145,8 @@ fn warnings(results: &Results, extras: &Extras, budget: &Budget) -> Vec<String> 
         );
     }
     texts.extend(budget.says(extras.bound));
-    if !extras.recorded {
-        texts.push("Without bytes and times, and charts over the bend: there is no `frames.jsonl` beside the results.".to_owned());
+    if !extras.absent.is_empty() {
+        texts.push(format!("Not beside the results: {}.", extras.absent.join(", ")));
     }
     texts
 }
