@@ -212,6 +212,24 @@ fn only_what_is_free_changes() {
     }
 }
 
+/// A bound on scales holds, and rates that fall to nothing leave the last iterations without effect.
+#[test]
+fn scales_are_bounded_and_rates_decay() {
+    let subject = subject();
+    let training = small(&subject.train[0], 3);
+    let bounded = options("animatable-skinned+free.scale_most=1.05+rates.scale=0.1", 12);
+    let start = start(&training, &bounded).unwrap().avatar;
+    let growth = |options: &FitOptions| {
+        let avatar = fitted(&training, options);
+        let scales = avatar.gaussians.log_scales.iter().zip(&start.gaussians.log_scales);
+        scales.map(|(now, first)| (*now - *first).max_element().exp()).fold(0.0, f32::max)
+    };
+    let free = options("animatable-skinned+free.scale_most=0.0+rates.scale=0.1", 12);
+    assert!((1.04..1.051).contains(&growth(&bounded)) && growth(&free) > 1.5);
+    let decayed = options("animatable-skinned+free.scale_most=0.0+rates.scale=0.1+rates.decay=0.000001", 12);
+    assert!(growth(&decayed) < 0.7 * growth(&free), "{} {}", growth(&decayed), growth(&free));
+}
+
 #[test]
 fn splitting_and_walking_change_the_number_and_keep_the_binding() {
     let training = small(&subject().train[0], 4);
