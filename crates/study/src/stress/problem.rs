@@ -47,7 +47,7 @@ impl Family {
         }
     }
 
-    /// The last input at which a subject broke, said: with its unit, and on which side of it the harder inputs are.
+    /// Where a subject breaks, in words: with its unit, and on which side of it the harder inputs are.
     pub(super) fn at(&self, said_value: f64) -> String {
         let unit = match self.said_axis() {
             "bones" if said_value == 1.0 => " bone",
@@ -56,8 +56,9 @@ impl Family {
             axis if axis.contains("degrees") => "°",
             _ => "",
         };
-        let falls = self.points.last().map(|&x| self.said(x)) < self.points.first().map(|&x| self.said(x));
-        let side = if self.continuous && falls { "below" } else { "at" };
+        let [easiest, hardest] = [self.points.first(), self.points.last()].map(|x| x.map(|&x| self.said(x)));
+        let from_the_first = easiest == Some(said_value);
+        let side = if self.continuous && hardest < easiest && !from_the_first { "below" } else { "at" };
         format!("{side} {}{unit}", said(said_value))
     }
 
@@ -151,6 +152,7 @@ fn antipodal(n: f64) -> Problem {
     let mut problem = random_bones(n, Some(60.0), 31);
     let negated: Vec<_> = problem.quats.iter().map(|q| q.map(|c| -c)).collect();
     problem.quats.extend(negated);
+    problem.weights.iter_mut().for_each(|weight| *weight *= 0.5);
     problem.weights.extend_from_within(..);
     problem
 }
