@@ -212,7 +212,7 @@ fn only_what_is_free_changes() {
     }
 }
 
-/// A bound on scales holds, and rates that fall to nothing leave the last iterations without effect.
+/// A bound on scales holds, and rates that fall move less.
 #[test]
 fn scales_are_bounded_and_rates_decay() {
     let subject = subject();
