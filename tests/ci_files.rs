@@ -91,5 +91,24 @@ fn the_script_of_the_gitlab_job_runs_and_carries_the_verdict() {
             ("CARGO_HOME", "none"),
         ];
         bash(&desk, &script, &environment).exits(code, baseline);
+        assert!(!desk.path("asked").exists(), "nobody gave a token");
+        // Somebody else's server: what it is asked is written down.
+        desk.put("bin/curl", "#!/bin/sh\nprintf '%s\\n' \"$@\" >asked; exit 22\n");
+        let posting = format!("chmod +x bin/curl; PATH=$PWD/bin:$PATH\n{script}");
+        let request = [
+            ("COMMENT_TOKEN", "secret"),
+            ("CI_MERGE_REQUEST_IID", "7"),
+            ("CI_PROJECT_ID", "42"),
+            ("CI_API_V4_URL", "https://gitlab.example/api/v4"),
+        ];
+        let said = bash(&desk, &posting, &[&environment[..], &request].concat()).exits(code, baseline);
+        assert!(said.err.contains("the note was not posted"), "{}", said.err);
+        let asked = desk.read("asked");
+        assert!(asked.contains("body@skinsplat-ci/comment.md"), "{asked}");
+        assert!(
+            asked.ends_with("https://gitlab.example/api/v4/projects/42/merge_requests/7/notes\n"),
+            "{asked}"
+        );
+        std::fs::remove_file(desk.path("asked")).unwrap();
     }
 }

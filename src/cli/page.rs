@@ -69,6 +69,9 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images, context: Co
     let has = |table: &String| results.tables.iter().any(|own| own.experiment == *table);
     index.frames.retain(|kept| has(&kept.table));
     index.moving.retain(|of| has(&of.table));
+    if index.frames.len() > FEW {
+        context.note(format!("page: pictures of {} frames", index.frames.len()));
+    }
     let mut lost = Lost::default();
     let moving = index.moving.iter().filter_map(|of| lost.or(&of.file, moving(&pictures, of)));
     extras.pictures.moving = moving.collect();

@@ -7,6 +7,7 @@ use super::products::{
     AVATARS, JSON, MARKDOWN, Printed, kept_in, make_folder, printed, verdict, write_bend, write_curves,
     write_results, write_text,
 };
+use super::selection::read_json;
 use super::{Context, Exit, progress::Watch};
 use anyhow::{Context as _, Result};
 use skinsplat::experiment::{Job, Records, Shard, Unreadable};
@@ -14,7 +15,7 @@ use skinsplat::report::{self, Results, TableResults};
 use skinsplat::run::motion::{self, Motion};
 use skinsplat::run::pictures;
 use skinsplat::run::plan_file::{LeftOut, PlanFile};
-use skinsplat::run::provenance::{Provenance, Stopwatch};
+use skinsplat::run::provenance::{Phases, Provenance, Stopwatch};
 use skinsplat::run::store::{self, FILE_NAME, Store};
 use skinsplat::run::{self, Machine};
 use skinsplat::run::{cache, costs, gallery};
@@ -135,6 +136,9 @@ impl Run {
         let (rendered, results) = self.execute(&planned, &stopwatch, context)?;
         provenance.frames_rendered = rendered;
         provenance.phases = stopwatch.phases();
+        if let Some(earlier) = self.earlier_phases(&provenance.plan) {
+            provenance.phases.or_those_of(&earlier);
+        }
         provenance.frames_planned = planned.plan.jobs.len();
         provenance.seconds = start.elapsed().as_secs_f64();
         match results {
@@ -212,6 +216,18 @@ impl Run {
         let store = self.out.join(self.store_name());
         context.note(format!("{missing} scores of this slice are missing; {} says why", store.display()));
         Ok(Exit::Incomplete)
+    }
+
+    /// Where the time of the call before went, if it was of the same plan.
+    fn earlier_phases(&self, plan: &str) -> Option<Phases> {
+        #[derive(serde::Deserialize)]
+        struct Earlier {
+            plan: String,
+            phases: Phases,
+        }
+        // What cannot be read, of an older program or cut short, is about to be replaced.
+        let earlier: Earlier = read_json(&self.out.join("run.json")).ok()?;
+        (earlier.plan == plan).then_some(earlier.phases)
     }
 
     /// Name of the store that this call appends to.

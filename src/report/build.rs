@@ -164,18 +164,33 @@ fn unfitted(variant: &VariantResults) -> Option<String> {
 /// Why a column has no number: of a metric of motion what its frames say, else what the metric needs.
 fn not_computed(column: &Column, variants: &[&VariantResults]) -> String {
     if column.metric.needs_before() {
-        let summaries =
-            variants.iter().map(|variant| if column.fitted { &variant.fitted } else { &variant.summary });
-        let mut missing = summaries.flatten().filter_map(|summary| summary.not_computed.get(&column.metric));
-        let reason = missing.next();
-        let reason = reason.map_or("not asked for", String::as_str);
-        return format!("n/c: {} was computed for no frame ({reason})", column.title());
+        let frames = variants.iter().flat_map(|variant| &variant.frames);
+        let scores = frames.filter_map(|f| if column.fitted { f.fitted_score() } else { f.score.as_ref() });
+        let reasons: Vec<&String> =
+            scores.filter_map(|score| score.not_computed.get(&column.metric)).collect();
+        return format!("n/c: {} was computed for no frame ({})", column.title(), each_counted(&reasons));
     }
     let reason = match column.metric.metric().needs {
         "" => String::new(),
         needs => format!(" ({needs})"),
     };
     format!("n/c: {} was not computed for every frame{reason}", column.title())
+}
+
+/// Reasons, in order of first use, with how often where there are several: `the first frame (1), a gap before it (3)`.
+fn each_counted(reasons: &[&String]) -> String {
+    let mut counts: Vec<(&String, usize)> = Vec::new();
+    for &reason in reasons {
+        match counts.iter_mut().find(|(known, _)| *known == reason) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((reason, 1)),
+        }
+    }
+    match counts.as_slice() {
+        [] => "not asked for".to_owned(),
+        [(reason, _)] => (*reason).clone(),
+        _ => counts.iter().map(|(reason, n)| format!("{reason}: {n}")).collect::<Vec<_>>().join("; "),
+    }
 }
 
 /// `3 of 12 frames missing: a (error), b (not run), ...`.

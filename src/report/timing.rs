@@ -115,7 +115,8 @@ pub fn calls(phases: &Phases) -> Table {
     rows.push(row(rows.len(), "frames".to_owned(), None, phases.frames));
     Table {
         sentences: vec![
-            "Wall-clock seconds of the last call of `run` on this folder; what it found done took none"
+            "Wall-clock seconds of the last call of `run` on this folder; avatars that it found done have the times of the call \
+             that made them, and frames that it found done took none"
                 .to_owned(),
             "Start: the avatar with which a fit begins. Fit: its iterations. Curve: scores on the way, on test frames. Avatars \
              without these were made from frames or read"

@@ -62,6 +62,25 @@ pub struct Phases {
     pub frames: f64,
 }
 
+impl Phases {
+    /// With the times that an earlier call took for the avatars that this one found done or had no need of.
+    pub fn or_those_of(&mut self, earlier: &Self) {
+        let was_fitted = |parts: &FitParts| parts.iterations > 0.0;
+        for (avatar, parts) in earlier.avatars.iter().zip(&earlier.fits) {
+            match self.avatars.iter().position(|(label, _)| *label == avatar.0) {
+                None => {
+                    self.avatars.push(avatar.clone());
+                    self.fits.push(*parts);
+                }
+                Some(i) if was_fitted(parts) && !was_fitted(&self.fits[i]) => {
+                    (self.avatars[i].1, self.fits[i]) = (avatar.1, *parts);
+                }
+                Some(_) => {}
+            }
+        }
+    }
+}
+
 /// Wall-clock seconds of the parts of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FitParts {

@@ -289,7 +289,7 @@ fn the_parts_of_a_fit_and_the_bytes_of_an_avatar_are_told() {
     desk.put("small.toml", include_str!("small.toml"));
     let all =
         args!["-q", "run", "small.toml", "--data", data("small"), "--fit-iterations", "2", "--out", "run"];
-    desk.ok([all, args!["--html", "page.html"]].concat());
+    desk.ok([all.clone(), args!["--html", "page.html"]].concat());
     let run: Value = serde_json::from_str(&desk.read("run/run.json")).unwrap();
     let (avatars, fits) = (&run["phases"]["avatars"], run["phases"]["fits"].as_array().unwrap());
     let part = |i: usize, part: &str| fits[i][part].as_f64().unwrap();
@@ -304,6 +304,11 @@ fn the_parts_of_a_fit_and_the_bytes_of_an_avatar_are_told() {
     }
     let timing = desk.ok(args!["report", "run", "--timing"]);
     assert!(timing.contains("| all avatars |") && timing.contains("Start, s"), "{timing}");
+    // A call that finds everything done keeps what is known of the fits.
+    desk.ok(all);
+    let again: Value = serde_json::from_str(&desk.read("run/run.json")).unwrap();
+    assert_eq!(again["phases"]["fits"], run["phases"]["fits"]);
+    assert_eq!(again["phases"]["avatars"], run["phases"]["avatars"]);
     // The surface avatar is one file; the start of a fit is another, and no avatar of the table.
     let kept = std::fs::read_dir(desk.path("run/avatars")).unwrap().map(|entry| entry.unwrap().path());
     let made = kept.filter(|path| path.extension().is_some_and(|kind| kind == "ply"));

@@ -52,6 +52,10 @@ const DIGIT: f64 = 11.0;
 const TITLE: f64 = 24.0;
 /// Points of a series up to which each is drawn large in a plane.
 const FEW: usize = 60;
+/// Radius of a point in a plane.
+const RADIUS: f64 = 4.5;
+/// Width of a letter and height of a line of names, where letters are small and where they are large (style.css).
+const LETTERS: [[f64; 2]; 2] = [[6.0, 12.0], [10.5, 20.0]];
 /// From a label to its axis.
 const GAP: f64 = 6.0;
 /// Colours of the style sheet; from there on with another dash.
@@ -138,12 +142,14 @@ impl Chart {
         let y = Axis::of(points().map(|p| p.y), self.log[1]);
         let frame = Frame::new(x, y);
         let left_out = self.left_out();
+        let names = self.names(&frame);
         html! {
             figure.chart {
                 figcaption id={ (at) "-c" } { (self.title) }
                 svg viewBox=(format!("0 0 {} {}", SIZE[0], SIZE[1])) role="img" aria-labelledby={ (at) "-c" } {
                     (frame.grid(&self.x, &self.y))
                     @for (i, series) in self.series.iter().enumerate() { (series.markup(i, self.kind, &frame)) }
+                    @if let Some(names) = names { (names) }
                 }
                 @if self.series.len() > 1 { (self.legend()) }
                 @if left_out > 0 {
@@ -152,6 +158,28 @@ impl Chart {
                 @if !self.note.is_empty() { p.remark { (self.note) } }
             }
         }
+    }
+
+    /// The names beside points, as far as there is room: where names would lie on each other, or on points, the later one is left to
+    /// whoever points there. Where letters are large (on narrow screens) fewer have room.
+    fn names(&self, frame: &Frame) -> Option<Markup> {
+        let placed: Vec<(&Point, [f64; 2])> =
+            self.series.iter().flat_map(|series| series.placed(frame)).collect();
+        let dots: Vec<Rect> = placed.iter().map(|(_, at)| Rect::around(*at, RADIUS)).collect();
+        let named: Vec<(&str, [f64; 2])> =
+            placed.iter().filter_map(|(point, at)| Some((point.label.as_deref()?, *at))).collect();
+        let [small, large] = LETTERS.map(|letter| arrange(&named, &dots, letter));
+        (!named.is_empty()).then(|| {
+            html! {
+                @for (class, names) in [("wide", small), ("narrow", large)] {
+                    g class=(class) {
+                        @for ((name, _), at) in named.iter().zip(names) {
+                            @if let Some([x, y]) = at { text x=(n(x)) y=(n(y)) { (name) } }
+                        }
+                    }
+                }
+            }
+        })
     }
 
     fn legend(&self) -> Markup {
@@ -225,10 +253,59 @@ impl Frame {
     }
 }
 
+/// Sides of a rectangle: left, top, right, bottom.
+#[derive(Clone, Copy, Debug)]
+struct Rect([f64; 4]);
+
+impl Rect {
+    fn around([x, y]: [f64; 2], radius: f64) -> Self {
+        Self([x - radius, y - radius, x + radius, y + radius])
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+        a < g && e < c && b < h && f < d
+    }
+
+    fn inside(&self) -> bool {
+        let [left, top, right, bottom] = self.0;
+        left >= 0.0 && top >= 0.0 && right <= SIZE[0] && bottom <= SIZE[1]
+    }
+}
+
+/// Where names begin, at the left of their base line: right of, left of, above or below their points, the first that has room.
+fn arrange(named: &[(&str, [f64; 2])], dots: &[Rect], [width, height]: [f64; 2]) -> Vec<Option<[f64; 2]>> {
+    let mut taken = dots.to_vec();
+    let place = |&(name, [x, y]): &(&str, [f64; 2])| {
+        let length = width * name.chars().count() as f64;
+        let (beside, middle) = (RADIUS + 2.0, y + 0.35 * height);
+        let starts = [
+            [x + beside, middle],
+            [x - beside - length, middle],
+            [x - length / 2.0, y - beside - 0.2 * height],
+            [x - length / 2.0, y + beside + height],
+        ];
+        let found = starts.into_iter().find_map(|[x, y]| {
+            let box_of_text = Rect([x, y - 0.8 * height, x + length, y + 0.2 * height]);
+            let free = box_of_text.inside() && !taken.iter().any(|other| other.meets(&box_of_text));
+            free.then_some(([x, y], box_of_text))
+        });
+        found.map(|(at, text)| {
+            taken.push(text);
+            at
+        })
+    };
+    named.iter().map(place).collect()
+}
+
 impl Series {
+    /// Its points that the axes hold, and where.
+    fn placed<'s>(&'s self, frame: &'s Frame) -> impl Iterator<Item = (&'s Point, [f64; 2])> {
+        self.points.iter().filter_map(|point| Some((point, frame.place(point)?)))
+    }
+
     fn markup(&self, index: usize, kind: Kind, frame: &Frame) -> Markup {
-        let placed: Vec<(&Point, [f64; 2])> =
-            self.points.iter().filter_map(|point| Some((point, frame.place(point)?))).collect();
+        let placed: Vec<(&Point, [f64; 2])> = self.placed(frame).collect();
         let path: Vec<String> = placed.iter().map(|(_, [x, y])| format!("{},{}", n(*x), n(*y))).collect();
         // A mark per point is too much where there are thousands: the line has them all, and marks those that lead somewhere.
         let marks = placed.len() <= 400 || kind == Kind::Scatter;
@@ -244,20 +321,14 @@ impl Series {
 
     fn mark(&self, point: &Point, [x, y]: [f64; 2], kind: Kind) -> Markup {
         let few = self.points.len() <= FEW;
-        let radius = if kind == Kind::Scatter && few { 4.5 } else { 3.0 };
+        let radius = if kind == Kind::Scatter && few { RADIUS } else { 3.0 };
         let title = point.title.clone().unwrap_or_else(|| format!("{}: {}, {}", self.name, point.x, point.y));
         let title = point.without.iter().fold(title, |title, why| format!("{title}; {why}"));
         let hollow = point.without.is_some().then_some("hollow");
-        let right = x < SIZE[0] * 0.7;
-        let dot = html! {
-            circle class=[hollow] cx=(n(x)) cy=(n(y)) r=(radius) { title { (title) } }
-            @if let Some(label) = &point.label {
-                text x=(n(if right { x + 7.0 } else { x - 7.0 })) y=(n(y + 4.0)) text-anchor=(if right { "start" } else { "end" }) { (label) }
-            }
-        };
+        let dot = html! { circle class=[hollow] cx=(n(x)) cy=(n(y)) r=(radius) { title { (title) } } };
         match &point.picture {
             Some([sequence, name]) => html! {
-                a href="#pictures" data-sequence=(sequence) data-frame=(name) aria-label=(title) { (dot) }
+                a href="#pictures" data-sequence=(sequence) data-frame=(name) data-label=(self.name) aria-label=(title) { (dot) }
             },
             None => dot,
         }
@@ -283,7 +354,7 @@ mod tests {
         ];
         let html = Chart::lines("T", "x", "y").with(Series::new("a", points)).markup("s").into_string();
         assert!(html.contains("<title>frame 0: 10 dB</title>"), "{html}");
-        assert!(html.contains(r#"data-sequence="lab" data-frame="image_0000""#), "{html}");
+        assert!(html.contains(r#"data-sequence="lab" data-frame="image_0000" data-label="a""#), "{html}");
         assert_eq!(html.matches("<circle").count(), 2, "{html}");
         assert!(html.contains("1 of the points cannot be drawn"), "{html}");
         assert!(!html.contains("NaN") && !html.contains("inf\""), "{html}");
@@ -296,6 +367,19 @@ mod tests {
             Chart::scatter("T", "x", "y").with(Series::new("a", vec![point])).markup("s").into_string();
         assert!(html.contains("<title>frame 7; its picture was left out</title>"), "{html}");
         assert!(html.contains("class=\"hollow\"") && !html.contains("<a "), "{html}");
+    }
+
+    #[test]
+    fn names_do_not_lie_on_each_other() {
+        let named = [("power-15", [300.0, 100.0]), ("power-30", [302.0, 101.0]), ("newton", [301.0, 99.0])];
+        let dots: Vec<Rect> = named.iter().map(|(_, at)| Rect::around(*at, RADIUS)).collect();
+        let [small, large] = LETTERS.map(|letter| arrange(&named, &dots, letter));
+        assert_eq!(small.iter().flatten().count(), 3, "{small:?}");
+        assert!(small[0].unwrap()[0] > 302.0 && small[1].unwrap()[0] < 300.0, "{small:?}");
+        assert!(large[0].unwrap()[0] > 302.0, "{large:?}");
+        let crowd: Vec<(&str, [f64; 2])> = (0..50).map(|_| ("the same place", [300.0, 100.0])).collect();
+        let dots = [Rect::around([300.0, 100.0], RADIUS)];
+        assert_eq!(arrange(&crowd, &dots, LETTERS[0]).iter().flatten().count(), 4);
     }
 
     /// Letters are largest where the page is narrow: 19 units high, 11 a digit.

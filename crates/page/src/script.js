@@ -120,24 +120,26 @@ const viewers = [...document.querySelectorAll(".viewer")].map(box => {
   });
   return {
     box,
-    open(sequence, name) {
+    open(sequence, name, label) {
       const found = frames.find(frame => frame.sequence === sequence && frame.name === name);
       if (!found) return false;
       choose.sequence.selectedIndex = sequences.indexOf(sequence);
       fillFrames(name);
+      const view = found.views.findIndex(view => view.label === label);
+      if (view >= 0) { choose.right.selectedIndex = view; show(); }
       box.scrollIntoView({ block: "start" });
       box.focus({ preventScroll: true });
       return true;
     },
   };
 });
-// Points of charts lead to their frame, in the viewer of their own section first.
+// Points of charts lead to their frame and variant, in the viewer of their own section first.
 document.addEventListener("click", event => {
   const link = event.target.closest("a[data-frame]");
   if (!link) return;
   event.preventDefault();
   const near = viewers.filter(viewer => viewer.box.closest("section") === link.closest("section"));
-  [...near, ...viewers].some(viewer => viewer.open(link.dataset.sequence, link.dataset.frame));
+  [...near, ...viewers].some(viewer => viewer.open(link.dataset.sequence, link.dataset.frame, link.dataset.label));
 });
 // Charts with several views: all of a section that have the chosen one show it.
 document.addEventListener("click", event => {

@@ -19,7 +19,7 @@ pub(super) fn untitled(table: &Table) -> Markup {
             @for sentence in &table.sentences { p.sentence { (prose(sentence)) "." } }
             @if !table.rows.is_empty() {
                 div.scroll tabindex="0" role="region" aria-label=(table.title) {
-                    table {
+                    table style={ "--ems:" (ems(table)) } {
                         thead { (groups(table)) tr { (headings(table)) } }
                         tbody { @for (row, repeats) in table.rows.iter().zip(repeats(table)) { (line(table, row, repeats)) } }
                     }
@@ -32,6 +32,31 @@ pub(super) fn untitled(table: &Table) -> Markup {
             @for remark in &table.remarks { p.remark { (prose(remark)) } }
         }
     }
+}
+
+/// Em that a letter takes, the bold ones of headings included.
+const LETTER: f64 = 0.62;
+/// Em beside the text of a column: style.css, on paper.
+const BESIDE: f64 = 0.9;
+
+/// The least width of the table in em, by which it is set small enough for paper: words do not break, nor do numbers.
+fn ems(table: &Table) -> usize {
+    let word = |text: &str| text.split([' ', '\n']).map(|word| word.chars().count()).max().unwrap_or(0);
+    let label = |i: usize| {
+        let rows = table.rows.iter().filter_map(|row| Some(word(row.labels.get(i)?))).max();
+        rows.unwrap_or(0).max(word(&table.labels[i].title))
+    };
+    let column = |(i, column): (usize, &Column)| {
+        let cell = |cell: &Cell| match cell.content {
+            Content::Phrase(_) => word(&cell.text),
+            _ if column.align != Align::Right => word(&cell.text),
+            _ => cell.text.chars().count(),
+        };
+        let rows = table.rows.iter().filter_map(|row| Some(cell(row.cells.get(i)?))).max();
+        rows.unwrap_or(0).max(word(&column.heading()))
+    };
+    let widths = (0..table.labels.len()).map(label).chain(table.columns.iter().enumerate().map(column));
+    widths.map(|letters| LETTER * letters as f64 + BESIDE).sum::<f64>().ceil() as usize
 }
 
 /// A line of headings over neighbouring columns, if there are any.

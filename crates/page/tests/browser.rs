@@ -112,9 +112,13 @@ fn page() -> Page {
 }
 
 fn opened(width: u32, dark: bool) -> Option<(tempfile::TempDir, Chromium)> {
+    opened_as(&page(), width, dark)
+}
+
+fn opened_as(page: &Page, width: u32, dark: bool) -> Option<(tempfile::TempDir, Chromium)> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("page.html");
-    std::fs::write(&file, page().html()).unwrap();
+    std::fs::write(&file, page.html()).unwrap();
     let browser = Chromium::open(&file, width, 900, dark)?;
     Some((folder, browser))
 }
@@ -169,11 +173,13 @@ fn a_person_can_sort_slide_switch_and_print() {
     assert_eq!(browser.value(alt), format!("{NAME} image_0001: Original"));
     browser.press("e", 69);
     assert_eq!(browser.value(alt), format!("{NAME} image_0001: error of Original"));
+    browser.press("ArrowDown", 40);
+    assert_eq!(browser.value(alt), format!("{NAME} image_0001: error of Skinned"));
     browser.value("document.querySelector('a[data-frame=\"image_0007\"]').dispatchEvent(new MouseEvent('click', {bubbles: true, cancelable: true}))");
     assert_eq!(
         browser.value(alt),
         "bike image_0007: error of Original",
-        "a point of a chart leads to its frame"
+        "a point of a chart leads to its frame and variant"
     );
 
     let shown = "[...document.querySelectorAll('.views [data-view]')].filter(e => e.checkVisibility()).map(e => e.dataset.view).join()";
@@ -218,6 +224,32 @@ fn it_fits_a_phone_and_has_what_readers_of_screens_need() {
     }
     assert!(browser.value(CONTRAST).as_f64().unwrap() >= 4.5, "{}", browser.value(CONTRAST));
     assert_eq!(browser.complaints, Vec::<String>::new());
+}
+
+/// A4, upright, less its margins.
+const PAPER: u32 = 718;
+
+#[test]
+fn wide_tables_are_whole_on_paper() {
+    let value = |v: f64| Cell::number(v, Digits::Decimals(2));
+    let judged = || Cell::phrase(-20.75, "-20.75 [-21.50, -20.00], undecided, won 100 %");
+    let cells = || (0..24).map(|i| if i % 8 == 7 { judged() } else { value(1234.5 - f64::from(i)) });
+    let wide = Table {
+        columns: (0..24).map(|i| Column::new(format!("c{i}"), format!("Metric {i} ↑"))).collect(),
+        rows: vec![Row::new("a", ["lab / sequence_of_some_length", "Original"], cells().collect())],
+        ..table()
+    };
+    let narrow = Section::new("narrow", "Narrow").part(Part::Table(table()));
+    let page = Page::new("Tables").section(narrow).section(Section::new("w", "Wide").part(Part::Table(wide)));
+    let Some((_folder, mut browser)) = opened_as(&page, 1400, false) else { return };
+    browser.on_paper(PAPER);
+    keep(&mut browser, "paper-718.png");
+    let beyond = "[...document.querySelectorAll('table')].filter(t => t.getBoundingClientRect().right > innerWidth).length";
+    assert_eq!(browser.value(beyond), 0, "{}", browser.value("document.documentElement.outerHTML"));
+    let size = "[...document.querySelectorAll('table')].map(t => parseFloat(getComputedStyle(t).fontSize))";
+    let sizes = browser.value(size);
+    let [narrow, wide] = [0, 1].map(|i| sizes[i].as_f64().unwrap());
+    assert!(narrow > 11.0 && wide > 4.0 && wide < narrow, "{sizes}");
 }
 
 #[test]

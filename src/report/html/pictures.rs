@@ -3,6 +3,7 @@
 use super::encode;
 use crate::report::results::{SequenceResults, TableResults};
 use image::RgbImage;
+use rayon::prelude::*;
 use skinsplat_metrics::MetricId;
 use skinsplat_page::{Frame, Part, Picture, Scale, View, Viewer};
 use std::collections::BTreeMap;
@@ -183,13 +184,13 @@ impl Budget {
     /// The pictures of a table.
     pub(super) fn viewer(&self, results: &TableResults, pictures: &KeptPictures) -> Option<Viewer> {
         let of_table = pictures.stills.iter().enumerate().filter(|(_, s)| s.table == results.experiment);
-        let frames: Vec<Frame> = of_table
-            .filter(|(i, _)| self.shows(*i))
-            .filter_map(|(_, stills)| {
-                let sequence = results.sequences.iter().find(|sequence| sequence.id == stills.sequence)?;
-                Some(self.frame(sequence, stills))
-            })
-            .collect();
+        let shown: Vec<&Stills> =
+            of_table.filter(|(i, _)| self.shows(*i)).map(|(_, stills)| stills).collect();
+        let frame = |stills: &&Stills| {
+            let sequence = results.sequences.iter().find(|sequence| sequence.id == stills.sequence)?;
+            Some(self.frame(sequence, stills))
+        };
+        let frames: Vec<Frame> = shown.par_iter().filter_map(frame).collect();
         let title = format!("{}: pictures", results.table.title);
         (!frames.is_empty()).then(|| Viewer { title, frames, scale: Some(Scale::to(BRIGHTEST)) })
     }

@@ -422,7 +422,9 @@ impl<'a> Trainer<'a> {
         let mut total = loss.total;
         if stage != Stage::Texture {
             let Parameters { avatar, start, .. } = &self.parameters;
-            total += regularise::add(&recipe.loss_in(stage), avatar, start, &mut self.scratch.of_avatar);
+            let gradient = &mut self.scratch.of_avatar;
+            let seen = regularise::seen(gradient);
+            total += regularise::add(&recipe.loss_in(stage), avatar, start, &seen, gradient);
             if let Some(coupled) = &self.coupled {
                 total += coupled.add(&recipe.coupling, avatar, start, &mut self.scratch.of_avatar);
             }

@@ -7,18 +7,25 @@ use rayon::prelude::*;
 use skinsplat_core::math::portable;
 use skinsplat_core::scene::{Avatar, AvatarGradient, Binding};
 
-/// Adds the derivatives of all terms to `gradient` and returns their weighted sum.
+/// Which Gaussians the loss of a frame depends on, as its derivative says.
+pub(super) fn seen(gradient: &AvatarGradient) -> Vec<bool> {
+    gradient.opacity_logits.iter().map(|&slope| slope != 0.0).collect()
+}
+
+/// Adds the derivatives of all terms to `gradient` and returns their weighted sum. Sizes and opacities count of the Gaussians that are
+/// `seen`: nothing would hold the others, and steps of Adam are as long for small derivatives as for large ones.
 pub(super) fn add(
     terms: &LossTerms,
     avatar: &Avatar,
     origins: &[Origin],
+    seen: &[bool],
     gradient: &mut AvatarGradient,
 ) -> f64 {
     let n = avatar.gaussians.len() as f32;
     let mut total = 0.0;
     if terms.long_thin > 0.0 || terms.scale > 0.0 {
         let weight = terms.scale / (3.0 * n);
-        total += in_parts(&avatar.gaussians.log_scales, &mut gradient.log_scales, |log_scale, out| {
+        total += in_parts(&avatar.gaussians.log_scales, seen, &mut gradient.log_scales, |log_scale, out| {
             let scale = log_scale.map(portable::exp);
             let square = scale * scale;
             *out += 2.0 * weight * square;
@@ -34,11 +41,12 @@ pub(super) fn add(
     }
     if terms.opacity > 0.0 {
         let weight = terms.opacity / n;
-        total += in_parts(&avatar.gaussians.opacity_logits, &mut gradient.opacity_logits, |logit, out| {
-            let opacity = 1.0 / (1.0 + portable::exp(-logit));
-            *out += 2.0 * weight * opacity * opacity * (1.0 - opacity);
-            f64::from(weight * opacity * opacity)
-        });
+        total +=
+            in_parts(&avatar.gaussians.opacity_logits, seen, &mut gradient.opacity_logits, |logit, out| {
+                let opacity = 1.0 / (1.0 + portable::exp(-logit));
+                *out += 2.0 * weight * opacity * opacity * (1.0 - opacity);
+                f64::from(weight * opacity * opacity)
+            });
     }
     if terms.sh_rest > 0.0 {
         total += sh_rest(terms.sh_rest / n, avatar, gradient);
@@ -52,15 +60,20 @@ pub(super) fn add(
 /// Rows of parameters per unit of parallel work: fixed, so that sums do not depend on the number of threads.
 const PART: usize = 4096;
 
-/// The sum of a term over the Gaussians, which adds its derivatives on the way.
+/// The sum of a term over the Gaussians that are seen, which adds its derivatives on the way.
 fn in_parts<P: Sync, D: Send>(
     parameters: &[P],
+    seen: &[bool],
     gradient: &mut [D],
     term: impl Fn(&P, &mut D) -> f64 + Sync,
 ) -> f64 {
-    let parts = parameters.par_chunks(PART).zip(gradient.par_chunks_mut(PART));
-    let sums: Vec<f64> =
-        parts.map(|(own, out)| own.iter().zip(out).map(|(own, out)| term(own, out)).sum()).collect();
+    let parts = parameters.par_chunks(PART).zip(seen.par_chunks(PART)).zip(gradient.par_chunks_mut(PART));
+    let sums: Vec<f64> = parts
+        .map(|((own, seen), out)| {
+            let all = own.iter().zip(seen).zip(out);
+            all.filter(|((_, seen), _)| **seen).map(|((own, _), out)| term(own, out)).sum()
+        })
+        .collect();
     sums.iter().sum()
 }
 
@@ -211,6 +224,21 @@ mod tests {
         assert!(gradient.log_scales[0].x > 0.0 && gradient.log_scales[1].y > 0.0);
     }
 
+    #[test]
+    fn sizes_and_opacities_count_of_what_is_seen() {
+        let recipe = Recipe::parse("pure-skinned+loss.scale=40.0+loss.opacity=0.2").expect("known");
+        let (own, mut gradient) = (avatar(), AvatarGradient::default());
+        gradient.reset(&own.gaussians, true);
+        gradient.opacity_logits[1] = 1e-30;
+        let seen = seen(&gradient);
+        assert_eq!(seen, [false, true, false]);
+        add(&recipe.loss, &own, &Origin::of(&own), &seen, &mut gradient);
+        for i in 0..3 {
+            assert_eq!(gradient.log_scales[i] != Vec3::ZERO, seen[i]);
+            assert_eq!(gradient.opacity_logits[i] != 0.0, seen[i]);
+        }
+    }
+
     fn derivatives_of(recipe: Recipe) {
         let terms = LossTerms { displacement: 5.0, ..recipe.loss };
         let mut moved = avatar();
@@ -221,7 +249,7 @@ mod tests {
         let value = |avatar: &Avatar| {
             let mut gradient = AvatarGradient::default();
             gradient.reset(&avatar.gaussians, true);
-            (add(&terms, avatar, &origins, &mut gradient), gradient)
+            (add(&terms, avatar, &origins, &[true; 3], &mut gradient), gradient)
         };
         let (_, gradient) = value(&moved);
         let step = 1e-2f32;

@@ -187,6 +187,12 @@ impl Chromium {
         base64::engine::general_purpose::STANDARD.decode(shot["data"].as_str().unwrap()).unwrap()
     }
 
+    /// Shows the page as it is laid out on paper of so many pixels in width.
+    pub fn on_paper(&mut self, width: u32) {
+        self.ask("Emulation.setEmulatedMedia", json!({ "media": "print" }));
+        self.resize(width, 900);
+    }
+
     /// The page on paper.
     pub fn pdf(&mut self) -> Vec<u8> {
         use base64::Engine as _;

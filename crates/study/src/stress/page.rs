@@ -2,7 +2,7 @@
 
 use super::averages::said_of;
 use super::report::Report;
-use super::table::{Findings, LIMITS, Row, UNDETERMINED};
+use super::table::{Findings, LIMITS, Row, UNDETERMINED, Verdict};
 use skinsplat_page::{Chart, Page, Part, Picture, Point, Section, Series};
 use std::collections::BTreeMap;
 
@@ -59,9 +59,10 @@ fn curves(findings: &Findings) -> Vec<Chart> {
 }
 
 fn chart(family: &str, axis: &str, subjects: Subjects<'_>) -> Option<Chart> {
-    let off = |rows: &[(f64, &Row)]| {
-        rows.iter().any(|(_, row)| row.error.value().is_some_and(|e| e > LIMITS.degrees[0]))
-    };
+    // Not what rounding of the input alone may turn: that is no method's, and the verdict allows for it.
+    let judged_off =
+        |row: &Row| row.verdict != Verdict::Holds && row.error.value().is_some_and(|e| e > LIMITS.degrees[0]);
+    let off = |rows: &[(f64, &Row)]| rows.iter().any(|(_, row)| judged_off(row));
     let (bad, good): (Vec<_>, Vec<_>) = subjects.into_iter().partition(|(_, rows)| off(rows));
     let inputs: Vec<f64> = bad.first()?.1.iter().map(|(x, _)| *x).collect();
     let wide = !axis.ends_with("degrees")
@@ -82,6 +83,10 @@ fn chart(family: &str, axis: &str, subjects: Subjects<'_>) -> Option<Chart> {
         };
         chart = chart.with(Series::new(subject, rows.iter().filter_map(point).collect()));
     }
-    let note = format!("Within {}° everywhere here: {}.", LIMITS.degrees[0], holding.join(", "));
+    let note = format!(
+        "Within {}°, and what rounding of the input alone may turn, everywhere here: {}.",
+        LIMITS.degrees[0],
+        holding.join(", ")
+    );
     Some(if holding.is_empty() { chart } else { chart.note(note) })
 }
