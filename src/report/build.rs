@@ -308,3 +308,16 @@ fn differences(experiment: &Experiment, over: &[SequenceResults], pair: Pair<'_>
     };
     columns.map(difference).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::each_counted;
+
+    #[test]
+    fn reasons_are_counted_where_there_are_several() {
+        let [first, gap] = ["the first frame", "a gap before it"].map(str::to_owned);
+        assert_eq!(each_counted(&[]), "not asked for");
+        assert_eq!(each_counted(&[&gap, &gap]), "a gap before it");
+        assert_eq!(each_counted(&[&gap, &first, &gap]), "a gap before it: 2; the first frame: 1");
+    }
+}

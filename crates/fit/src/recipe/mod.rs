@@ -239,9 +239,9 @@ pub struct LossTerms {
     pub long_thin_ratio: f32,
     /// The standard deviation above which a Gaussian counts as long, metres.
     pub long_thin_limit: f32,
-    /// Of the mean squared standard deviation, per square metre.
+    /// Of the mean squared standard deviation, per square metre; what the frame does not see counts as nothing.
     pub scale: f32,
-    /// Of the mean squared opacity.
+    /// Of the mean squared opacity; what the frame does not see counts as nothing.
     pub opacity: f32,
     /// Of the mean squared distance from where the Gaussians started, per square metre.
     pub displacement: f32,
