@@ -47,6 +47,7 @@ impl Neighbours {
         Self { offsets, indices: pairs.into_iter().map(|(_, b)| b).collect() }
     }
 
+    #[inline]
     pub(super) fn of(&self, i: usize) -> &[u32] {
         &self.indices[self.offsets[i]..self.offsets[i + 1]]
     }

@@ -21,12 +21,29 @@ const PART: usize = 2048;
 /// Who is next to whom.
 pub(super) struct Coupled(Neighbours);
 
-/// One group of parameters: what has changed about each Gaussian, a row each, and where in the rows of the gradient its derivative goes.
-struct Group<'a> {
-    weight: f32,
-    changes: &'a [f32],
-    width: usize,
+/// Columns of a table: `width` of `stride`, from `first` on.
+#[derive(Clone, Copy)]
+struct Columns {
+    stride: usize,
     first: usize,
+    width: usize,
+}
+
+impl Columns {
+    /// All of so many.
+    fn all(width: usize) -> Self {
+        Self { stride: width, first: 0, width }
+    }
+
+    #[inline(always)]
+    fn of(self, table: &[f32], row: usize) -> &[f32] {
+        &table[row * self.stride + self.first..][..self.width]
+    }
+
+    #[inline(always)]
+    fn of_mut(self, table: &mut [f32], row: usize) -> &mut [f32] {
+        &mut table[row * self.stride + self.first..][..self.width]
+    }
 }
 
 impl Coupled {
@@ -67,28 +84,26 @@ impl Coupled {
         }
         if let Some(weight) = weight(options.scale) {
             let changes = vectors(&gaussians.log_scales, start, |origin| origin.log_scale);
-            let group = Group { weight, changes: &changes, width: 3, first: 0 };
-            total += self.group(&group, bytemuck::cast_slice_mut(&mut gradient.log_scales), 3);
+            let gradient = bytemuck::cast_slice_mut(&mut gradient.log_scales);
+            total += self.group(weight, (&changes, Columns::all(3)), (gradient, Columns::all(3)));
         }
         if let Some(weight) = weight(options.opacity) {
             let own = gaussians.opacity_logits.iter().zip(start);
             let changes: Vec<f32> = own.map(|(logit, origin)| logit - origin.opacity_logit).collect();
-            let group = Group { weight, changes: &changes, width: 1, first: 0 };
-            total += self.group(&group, &mut gradient.opacity_logits, 1);
+            let gradient = (&mut *gradient.opacity_logits, Columns::all(1));
+            total += self.group(weight, (&changes, Columns::all(1)), gradient);
         }
-        let stride = 3 * gaussians.sh_count();
-        let rows = || gaussians.sh.as_flattened().chunks_exact(stride);
+        let (stride, sh) = (3 * gaussians.sh_count(), gaussians.sh.as_flattened());
         if let Some(weight) = weight(options.colour) {
-            let own = rows().zip(start);
-            let changes: Vec<f32> =
-                own.flat_map(|(row, origin)| [0, 1, 2].map(|c| row[c] - origin.colour[c])).collect();
-            let group = Group { weight, changes: &changes, width: 3, first: 0 };
-            total += self.group(&group, gradient.sh.as_flattened_mut(), stride);
+            let own = sh.chunks_exact(stride).zip(start);
+            let changes: Vec<[f32; 3]> =
+                own.map(|(row, origin)| [0, 1, 2].map(|c| row[c] - origin.colour[c])).collect();
+            let gradient = (gradient.sh.as_flattened_mut(), Columns { stride, first: 0, width: 3 });
+            total += self.group(weight, (changes.as_flattened(), Columns::all(3)), gradient);
         }
         if let Some(weight) = weight(options.colour_rest).filter(|_| stride > 3) {
-            let changes: Vec<f32> = rows().flat_map(|row| row[3..].iter().copied()).collect();
-            let group = Group { weight, changes: &changes, width: stride - 3, first: 3 };
-            total += self.group(&group, gradient.sh.as_flattened_mut(), stride);
+            let rest = Columns { stride, first: 3, width: stride - 3 };
+            total += self.group(weight, (sh, rest), (gradient.sh.as_flattened_mut(), rest));
         }
         total
     }
@@ -104,47 +119,105 @@ impl Coupled {
             Binding::Static => 0.0,
             Binding::Vertex(_) => {
                 let changes = vectors(&avatar.gaussians.means, start, |origin| origin.mean);
-                let group = Group { weight, changes: &changes, width: 3, first: 0 };
-                self.group(&group, bytemuck::cast_slice_mut(&mut gradient.means), 3)
+                let gradient = (bytemuck::cast_slice_mut(&mut gradient.means), Columns::all(3));
+                self.group(weight, (&changes, Columns::all(3)), gradient)
             }
             Binding::Face(binding) => {
                 let own = binding.offsets.iter().zip(start);
                 let changes: Vec<f32> = own.map(|(offset, origin)| offset - origin.height).collect();
-                let group = Group { weight, changes: &changes, width: 1, first: 0 };
-                self.group(&group, &mut gradient.offsets, 1)
+                let gradient = (&mut *gradient.offsets, Columns::all(1));
+                self.group(weight, (&changes, Columns::all(1)), gradient)
             }
         }
     }
 
-    /// Half the sum of `weight` times the squared differences over all rows and their neighbours, each pair seen from either side.
-    fn group(&self, group: &Group<'_>, gradient: &mut [f32], stride: usize) -> f64 {
-        let &Group { weight, changes, width, first } = group;
-        let parts = gradient.par_chunks_mut(PART * stride).enumerate();
+    /// Half the sum of `weight` times the squared differences over all rows and their neighbours, each pair seen from either side: what
+    /// has changed about each Gaussian in a table with a row each, its derivative added in another.
+    fn group(
+        &self,
+        weight: f32,
+        changes: (&[f32], Columns),
+        (gradient, into): (&mut [f32], Columns),
+    ) -> f64 {
+        let parts = gradient.par_chunks_mut(PART * into.stride).enumerate();
         let sums: Vec<f64> = parts
-            .map(|(part, rows)| {
-                let mut sum = 0.0;
-                for (k, out) in rows.chunks_exact_mut(stride).enumerate() {
-                    let (i, out) = (part * PART + k, &mut out[first..first + width]);
-                    let own = &changes[i * width..][..width];
-                    for &other in self.0.of(i) {
-                        let theirs = &changes[other as usize * width..][..width];
-                        for ((own, theirs), out) in own.iter().zip(theirs).zip(&mut *out) {
-                            let difference = own - theirs;
-                            sum += difference * difference;
-                            *out += 2.0 * weight * difference;
-                        }
-                    }
-                }
-                f64::from(sum)
+            .map(|(part, gradient)| {
+                let (neighbours, first) = (&self.0, part * PART);
+                let gradient = (gradient, into);
+                skinsplat_simd::arch().dispatch(Part { neighbours, first, weight, changes, gradient })
             })
             .collect();
         0.5 * f64::from(weight) * sums.iter().sum::<f64>()
     }
 }
 
+/// Sums are kept apart in so many lanes: a vector's.
+const LANES: usize = 8;
+
+/// Rows from `first` on, and their neighbours.
+struct Part<'a> {
+    neighbours: &'a Neighbours,
+    first: usize,
+    weight: f32,
+    changes: (&'a [f32], Columns),
+    gradient: (&'a mut [f32], Columns),
+}
+
+impl pulp::NullaryFnOnce for Part<'_> {
+    /// The sum of the squared differences.
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let Self { neighbours, first, weight, changes: (changes, columns), gradient: (gradient, into) } = self;
+        let mut lanes = [0.0; LANES];
+        for row in 0..gradient.len() / into.stride {
+            let (i, out) = (first + row, into.of_mut(gradient, row));
+            let own = columns.of(changes, i);
+            for &other in neighbours.of(i) {
+                follow(2.0 * weight, own, columns.of(changes, other as usize), out, &mut lanes);
+            }
+        }
+        lanes.iter().map(|&lane| f64::from(lane)).sum()
+    }
+}
+
+/// Adds `weight` times the differences of two rows to `out`, and their squares to `lanes`.
+#[inline(always)]
+fn follow(weight: f32, own: &[f32], theirs: &[f32], out: &mut [f32], lanes: &mut [f32; LANES]) {
+    let rest = in_vectors::<LANES>(weight, (own, theirs, out), lanes);
+    let rest = in_vectors::<4>(weight, rest, lanes);
+    in_vectors::<1>(weight, rest, lanes);
+}
+
+/// What a row, another and a gradient have from some place on.
+type Rest<'a> = (&'a [f32], &'a [f32], &'a mut [f32]);
+
+/// [`follow`], as far as whole vectors of `N` go.
+#[inline(always)]
+fn in_vectors<'a, const N: usize>(
+    weight: f32,
+    (own, theirs, out): Rest<'a>,
+    lanes: &mut [f32; LANES],
+) -> Rest<'a> {
+    let (own, own_rest) = own.as_chunks::<N>();
+    let (theirs, theirs_rest) = theirs.as_chunks::<N>();
+    let (out, out_rest) = out.as_chunks_mut::<N>();
+    for ((own, theirs), out) in own.iter().zip(theirs).zip(out) {
+        for k in 0..N {
+            let difference = own[k] - theirs[k];
+            lanes[k] += difference * difference;
+            out[k] += weight * difference;
+        }
+    }
+    (own_rest, theirs_rest, out_rest)
+}
+
 /// How vectors differ from those of the start.
 fn vectors(now: &[Vec3], start: &[Origin], of: impl Fn(&Origin) -> Vec3) -> Vec<f32> {
-    now.iter().zip(start).flat_map(|(now, origin)| (*now - of(origin)).to_array()).collect()
+    let changes: Vec<[f32; 3]> =
+        now.iter().zip(start).map(|(now, origin)| (*now - of(origin)).to_array()).collect();
+    changes.into_flattened()
 }
 
 #[cfg(test)]
