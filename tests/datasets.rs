@@ -113,6 +113,21 @@ fn clothing_is_worn_only_on_request() {
 }
 
 #[test]
+fn a_validation_sequence_is_neither_trained_on_nor_a_test() {
+    let folder = tempfile::tempdir().unwrap();
+    let copied = folder.path().join("ava");
+    copy(&subject("snapshot_ava"), &copied);
+    std::fs::rename(copied.join("test_squat"), copied.join("val")).unwrap();
+    let options =
+        Options { model: Some(support::data("blender/models/anny_smpl24.npz")), ..Options::default() };
+    let loaded = Subject::load(&copied, &options).unwrap();
+    let names = |part: &[skinsplat_data::Sequence]| part.iter().map(|s| s.id.clone()).collect::<Vec<_>>();
+    assert_eq!([names(&loaded.train), names(&loaded.test)], [["train_casual"], ["test_twist"]]);
+    assert_eq!(names(&loaded.val), ["val"]);
+    assert_eq!(loaded.sequence("val").unwrap().frames.len(), 3);
+}
+
+#[test]
 fn truth_is_straight_colour_and_the_mask() {
     let subject = Subject::load(&subject("snapshot_ava"), &Options::default()).unwrap();
     let truth = subject.test[0].truth(0).unwrap();

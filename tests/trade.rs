@@ -206,6 +206,7 @@ fn subject(body: &RestBody) -> Subject {
         capture: Capture::Monocular,
         train: Vec::new(),
         test: vec![sequence],
+        val: Vec::new(),
         notes: Vec::new(),
         doubts: Vec::new(),
         shapes: Vec::new(),

@@ -9,8 +9,8 @@ out=${2:-runs/findings}
 reproduce() { ${REPRODUCE:-cargo run --release --locked --quiet --} run "$@"; }
 captures=(--subject snapshot_ava --subject snapshot_gus --subject snapshot_hana --subject multiview_hana)
 
-reproduce attribution-hugs attribution-animatable budget --data "$data" "${captures[@]}" --out "$out/attribution"
+reproduce attribution-hugs attribution-animatable attribution-splattingavatar attribution-ihuman budget \
+  --data "$data" "${captures[@]}" --out "$out/attribution"
 reproduce bend --data "$data" "${captures[@]}" --out "$out/bend"
-reproduce attribution-ihuman --data "$data" --subject snapshot_gus --out "$out/ihuman"
 reproduce lights --out "$out/lights"
 reproduce noise --data "$data" --subject xhands_gus --out "$out/noise"

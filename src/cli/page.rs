@@ -1,8 +1,9 @@
 //! The page of a run: what `run --html` and `report --format html` write.
 
 use super::Context;
-use anyhow::{Context as _, Result, anyhow};
+use anyhow::{Context as _, Result, anyhow, bail};
 use image::RgbImage;
+use skinsplat::experiment::Records;
 use skinsplat::report::html::{BOUND, Extras, KeptPictures, MovingPicture, Stills, frames_that_fit, html};
 use skinsplat::report::timing;
 use skinsplat::report::{Results, check_curves};
@@ -13,7 +14,7 @@ use skinsplat_data::error::{read_bytes, read_text};
 use skinsplat_data::{atomic, select::evenly_spaced};
 use std::collections::BTreeSet;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Component, Path};
 
 /// Which pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -55,12 +56,8 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images, context: Co
         false => None,
     };
     let tables = timing::costs(results, &records, measured.as_ref()).into_iter().collect();
+    let absent = absent(results, folder, &records, curves.is_empty());
     let bends = records.into_values().filter_map(|record| Some((record.key, record.bend?))).collect();
-    let absent = [
-        (stores.is_empty(), "`frames.jsonl` (bytes and times, charts over the bend)"),
-        (!folder.join("run.json").is_file(), "`run.json` (who made them, when and how)"),
-    ];
-    let absent = absent.iter().filter(|(gone, _)| *gone).map(|(_, file)| (*file).to_owned()).collect();
     let mut extras =
         Extras { pictures: KeptPictures::default(), bends, curves, tables, absent, bound: BOUND };
     let pictures = folder.join(PICTURES);
@@ -97,7 +94,8 @@ const FEW: usize = 32;
 /// Writes a page and says how large it is.
 pub(super) fn write_page(path: &Path, html: &str, context: Context) -> Result<()> {
     atomic::write(path, |w| w.write_all(html.as_bytes()))?;
-    context.note(format!("{}: {:.1} MB", path.display(), html.len() as f64 / 1e6));
+    let over = if html.len() > BOUND { ", beyond its bound by its tables alone" } else { "" };
+    context.note(format!("{}: {:.1} MB{over}", path.display(), html.len() as f64 / 1e6));
     Ok(())
 }
 
@@ -108,6 +106,13 @@ fn index(folder: &Path, images: Images) -> Result<Option<Index>> {
         return Ok(None);
     }
     let mut index: Index = super::selection::read_json(&path)?;
+    let stills =
+        index.frames.iter().flat_map(|of| of.variants.iter().map(|(_, file)| file).chain([&of.truth]));
+    let files = stills.chain(index.moving.iter().map(|of| &of.file));
+    let is_own = |file: &str| Path::new(file).components().all(|part| matches!(part, Component::Normal(_)));
+    if let Some(file) = files.into_iter().find(|file| !is_own(file)) {
+        bail!("{}: the picture {file}; expected the name of a file in the folder", path.display());
+    }
     index.frames.retain(|kept| images == Images::All || kept.telling);
     Ok(Some(index))
 }
@@ -161,6 +166,24 @@ fn names(of: &Kept) -> [&String; 3] {
     [&of.table, &of.sequence, &of.frame]
 }
 
+/// Files of the run's folder that are not there or hold less than the results, and what the page has not because of them.
+fn absent(results: &Results, folder: &Path, records: &Records, no_curves: bool) -> Vec<String> {
+    let variants = || results.tables.iter().flat_map(|table| &table.sequences).flat_map(|of| &of.variants);
+    let scored = || variants().flat_map(|variant| &variant.frames).filter(|frame| frame.score.is_some());
+    let (all, known) = (scored().count(), scored().filter(|frame| records.contains_key(&frame.key)).count());
+    let frames = match known {
+        0 => "`frames.jsonl` (bytes and times, charts over the bend)".to_owned(),
+        known => format!("`frames.jsonl` for {} of {all} scores (their bytes, times and bends)", all - known),
+    };
+    let fits = variants().any(|variant| variant.avatar.fitting_recipe().is_some());
+    let absent = [
+        (known < all, frames),
+        (!folder.join("run.json").is_file(), "`run.json` (who made them, when and how)".to_owned()),
+        (fits && no_curves, "`curves.csv` (how the fits went)".to_owned()),
+    ];
+    absent.into_iter().filter(|(gone, _)| *gone).map(|(_, file)| file).collect()
+}
+
 /// How fits went; nothing if there were none.
 fn curves(path: &Path) -> Result<String> {
     if !path.is_file() {
@@ -179,13 +202,25 @@ fn still(folder: &Path, kept: &Kept) -> Result<Stills> {
             .with_context(|| format!("{}: cannot read the picture", path.display()))?
             .to_rgb8())
     };
+    let truth = read(&kept.truth)?;
+    let like_truth = |file: &String| -> Result<RgbImage> {
+        let image = read(file)?;
+        let ((w, h), (width, height)) = (image.dimensions(), truth.dimensions());
+        if (w, h) != (width, height) {
+            bail!(
+                "{}: {w}x{h} pixels; expected {width}x{height}, as of the truth",
+                folder.join(file).display()
+            );
+        }
+        Ok(image)
+    };
     let variants =
-        kept.variants.iter().map(|(id, file)| Ok((id.clone(), read(file)?))).collect::<Result<_>>()?;
+        kept.variants.iter().map(|(id, file)| Ok((id.clone(), like_truth(file)?))).collect::<Result<_>>()?;
     Ok(Stills {
         table: kept.table.clone(),
         sequence: kept.sequence.clone(),
         frame: kept.frame.clone(),
-        truth: read(&kept.truth)?,
+        truth,
         variants,
     })
 }

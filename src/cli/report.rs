@@ -81,7 +81,8 @@ impl Report {
         }
         check_tables(&tables, std::slice::from_ref(&results))?;
         let results = only(&tables, results);
-        let text = if self.timing { self.timing(&results)? } else { self.tables(&results, context)? };
+        let text =
+            if self.timing { self.timing(&results, context)? } else { self.tables(&results, context)? };
         match &self.out {
             Some(path) if self.format(MARKDOWN) == HTML => write_page(path, &text, context)?,
             Some(path) => save(path, &text)?,
@@ -103,7 +104,7 @@ impl Report {
         })
     }
 
-    fn timing(&self, results: &Results) -> Result<String> {
+    fn timing(&self, results: &Results, context: Context) -> Result<String> {
         let format = self.format(MARKDOWN);
         if format == HTML {
             bail!(
@@ -113,9 +114,14 @@ impl Report {
         let records = store::merge(store::stores(folder(&self.run))?.iter().map(PathBuf::as_path))?;
         let mut tables: Vec<_> = report::timing::phases(results, &records).into_iter().collect();
         let path = folder(&self.run).join("run.json");
-        if path.is_file() {
-            let run: Timed = read_json(&path)?;
-            run.phases.iter().for_each(|phases| tables.insert(0, report::timing::calls(phases)));
+        let run: Option<Timed> = path.is_file().then(|| read_json(&path)).transpose()?;
+        match run.and_then(|run| run.phases) {
+            Some(phases) => tables.insert(0, report::timing::calls(&phases)),
+            None if tables.is_empty() => {}
+            None => context.note(format!(
+                "{}: no times of avatars: a run that did not end, or slices that were merged",
+                path.display()
+            )),
         }
         if tables.is_empty() {
             bail!(

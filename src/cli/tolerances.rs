@@ -27,8 +27,10 @@ fn option(metric: MetricId) -> Arg {
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {
+    let named = text.trim_start_matches('+').to_ascii_lowercase();
     match text.parse::<f64>() {
-        Ok(value) if value >= 0.0 => Ok(value),
+        // Beyond all numbers only where that is said: 1e400 is a slip.
+        Ok(value) if value >= 0.0 && (value.is_finite() || named.starts_with("inf")) => Ok(value),
         _ => Err("expected a number that is not negative, or inf".to_owned()),
     }
 }

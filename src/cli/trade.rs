@@ -123,7 +123,7 @@ impl Trading {
         };
         let OnBody { avatar, body, mesh, mut notes } = on_body(read_avatar(path)?, &body)?;
         if let Some(body) = body.map(Arc::new) {
-            let sequences = subject.train.iter_mut().chain(&mut subject.test);
+            let sequences = subject.train.iter_mut().chain(&mut subject.test).chain(&mut subject.val);
             sequences.for_each(|sequence| sequence.body = Arc::clone(&body));
         }
         if mesh.is_some() {

@@ -92,6 +92,7 @@ impl Dataset {
                 capture: parameters.capture,
                 train,
                 test,
+                val: Vec::new(),
                 notes: Vec::new(),
                 doubts: Vec::new(),
                 shapes: Vec::new(),

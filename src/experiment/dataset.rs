@@ -15,6 +15,8 @@ pub enum Role {
     Train,
     /// Renders are scored against it.
     Test,
+    /// Settings are chosen on it: scored where a table names it.
+    Val,
     /// Both: the experiment's split says which frames are which.
     Whole,
 }

@@ -191,7 +191,7 @@ impl Split {
         match role {
             Role::Train => self.train_take.as_deref(),
             Role::Test => self.test_take.as_deref(),
-            Role::Whole => None,
+            Role::Val | Role::Whole => None,
         }
     }
 
@@ -200,7 +200,7 @@ impl Split {
         let (range, cameras) = match role {
             Role::Train => (self.train, &self.train_cameras),
             Role::Test => (self.test, &self.test_cameras),
-            Role::Whole => return true,
+            Role::Val | Role::Whole => return true,
         };
         let in_range = range.is_none_or(|range| self.steps(range).any(|time| time == frame.time));
         in_range && cameras.as_ref().is_none_or(|cameras| cameras.contains(&frame.camera))
@@ -211,7 +211,7 @@ impl Split {
         let (range, cameras) = match role {
             Role::Train => (self.train, &self.train_cameras),
             Role::Test => (self.test, &self.test_cameras),
-            Role::Whole => return None,
+            Role::Val | Role::Whole => return None,
         };
         Some(self.steps(range?).count() * cameras.as_ref().map_or(1, Vec::len))
     }

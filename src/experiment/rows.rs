@@ -113,22 +113,27 @@ fn own_rows(experiment: &Experiment, dataset: &Dataset, options: &Options) -> Ve
                 None => unusable(dataset, id),
                 Some(_) => format!("no test sequence of `{id}` matches the experiment's split"),
             };
-            rows.push(DataRow {
-                id: format!("{}/{id}", dataset.registered_id()),
-                label: id.into(),
-                dataset: dataset.id.clone(),
-                subject: id.into(),
-                sequence: String::new(),
-                frames: Vec::new(),
-                train: None,
-                missing: Some(missing),
-                data: None,
-                image: None,
-            });
+            rows.push(without_data(dataset, id, missing));
         }
         rows.extend(found);
     }
     rows
+}
+
+/// The row of a subject that has nothing to score.
+fn without_data(dataset: &Dataset, subject: &str, missing: String) -> DataRow {
+    DataRow {
+        id: format!("{}/{subject}", dataset.registered_id()),
+        label: subject.into(),
+        dataset: dataset.id.clone(),
+        subject: subject.into(),
+        sequence: String::new(),
+        frames: Vec::new(),
+        train: None,
+        missing: Some(missing),
+        data: None,
+        image: None,
+    }
 }
 
 /// Why a data set has no usable subject of this id.
@@ -168,7 +173,7 @@ fn own_subject_rows(
     tests.iter().map(row).collect()
 }
 
-/// The rows of a subject that stands in: each of its test sequences.
+/// The rows of a subject that stands in: each of its test sequences, or why it has none of those that the table names.
 fn stand_in_rows(
     stand_in: &StandIn,
     dataset: &Dataset,
@@ -186,7 +191,12 @@ fn stand_in_rows(
         let label = format!("{} / {}", subject.id, test.id);
         data_row(dataset, subject, test, label, indices(test, |_| true), train.clone(), options)
     };
-    tests.map(row).collect()
+    let rows: Vec<DataRow> = tests.map(row).collect();
+    if rows.is_empty() && !stand_in.test.is_empty() {
+        let missing = format!("`{}` has no sequence {}", subject.id, stand_in.test.join(", "));
+        return vec![without_data(dataset, &subject.id, missing)];
+    }
+    rows
 }
 
 /// Indices of the frames for which the condition holds.

@@ -45,12 +45,15 @@ pub(super) fn ran_on(
     let mut sentences = vec![
         data,
         format!("Protocol: {}, version {}", planned.protocol.id, planned.protocol.version),
-        profile(&options.profile, experiment),
+        profile(&options.profile, experiment, planned.source),
         frames(sequences),
     ];
     if experiment.seeds.len() > 1 {
         let seeds: Vec<String> = experiment.seeds.iter().map(u64::to_string).collect();
         sentences.push(format!("Mean ± standard deviation over the seeds {}", seeds.join(", ")));
+    }
+    if experiment.antialiased {
+        sentences.push("Drawn by the antialiased rasterizer".to_owned());
     }
     sentences.extend(poses(experiment));
     sentences.extend(motion(experiment));
@@ -129,7 +132,7 @@ fn motion(experiment: &Experiment) -> Option<String> {
     (!parts.is_empty()).then(|| format!("{between} (mean of frames that have one): {}", parts.join("; ")))
 }
 
-fn profile(profile: &Profile, experiment: &Experiment) -> String {
+fn profile(profile: &Profile, experiment: &Experiment, source: Source) -> String {
     let mut bounds = Vec::new();
     if let Some(n) = profile.max_test_frames {
         bounds.push(format!("at most {n} test frames per sequence"));
@@ -137,7 +140,7 @@ fn profile(profile: &Profile, experiment: &Experiment) -> String {
     if let Some(n) = profile.max_train_frames {
         bounds.push(format!("at most {n} training frames"));
     }
-    if let Some(side) = profile.resolution {
+    if let Some(side) = experiment.resolution_on(source, profile) {
         bounds.push(format!("images of at most {side} pixels a side"));
     }
     if bounds.is_empty() {

@@ -66,6 +66,10 @@ fn table(
     });
     let sequences: Vec<SequenceResults> = sequences.collect::<Result<_, _>>()?;
     let mut made = build::table(experiment, planned, &plan.options, &sequences);
+    let profile = &plan.options.profile;
+    // What the profile says already is not the table's.
+    let side = experiment.resolution_on(planned.source, profile);
+    let resolution = side.filter(|_| side != profile.resolution);
     made.sentences.extend(variants.iter().filter_map(|variant| avatar_file(plan, variant, jobs)));
     Ok(TableResults {
         experiment: experiment.id.clone(),
@@ -74,6 +78,8 @@ fn table(
         datasets: planned.datasets.clone(),
         source: planned.source,
         test_pose: experiment.fitted_test_poses().cloned(),
+        resolution,
+        antialiased: experiment.antialiased,
         table: made,
         comparisons: build::comparisons(experiment, &sequences),
         paper: experiment.paper.as_ref().map(|paper| paper::printed_table(experiment, paper)),

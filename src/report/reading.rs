@@ -9,6 +9,10 @@ use skinsplat_data::words::Language;
 /// # Errors
 /// One line: the place, as `tables[0].sequences`, the problem, and what was expected.
 pub(super) fn from_json<T: DeserializeOwned>(text: &str, what: &str) -> Result<T, String> {
+    if text.trim_start().starts_with('[') {
+        // The reader of types would take its items for fields.
+        return Err(described("", "invalid type: sequence, expected struct"));
+    }
     serde_json::from_str(text).map_err(|error| match error.classify() {
         Category::Data => described(&place(text, error.line(), error.column()), &error.to_string()),
         _ => format!("no JSON: {error}; expected {what}"),

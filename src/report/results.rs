@@ -91,6 +91,12 @@ pub struct TableResults {
     /// How test poses were fitted, where they were.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test_pose: Option<PoseFit>,
+    /// Longest side of images that the experiment asks for, pixels, where that is less than the profile's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resolution: Option<u32>,
+    /// Whether the antialiased rasterizer drew.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub antialiased: bool,
     /// The table as it is printed.
     pub table: Table,
     /// Variants compared frame by frame, per sequence and over all of them.
@@ -117,6 +123,10 @@ impl TableResults {
         for SequenceResults { id, variants, .. } in &self.sequences {
             let ids = variants.iter().map(|variant| variant.id.as_str());
             once(&format!("{place}: `{id}`: variants: id"), ids)?;
+            for variant in variants {
+                let at = format!("{place}: `{id}`: variants: `{}`", variant.id);
+                variant.check(&self.protocol).map_err(|problem| format!("{at}: {problem}"))?;
+            }
         }
         self.table.check()?;
         self.paper.as_ref().map_or(Ok(()), Table::check)
@@ -180,6 +190,36 @@ pub struct VariantResults {
 }
 
 impl VariantResults {
+    /// Checks that its parts agree with each other, and with the protocol of the table.
+    fn check(&self, protocol: &ProtocolId) -> Result<(), String> {
+        let places: Vec<String> = self.frames.iter().map(|frame| frame.frame.to_string()).collect();
+        once("frames: frame", places.iter().map(String::as_str))?;
+        let other = |what: &str, of: &ProtocolId| {
+            (of != protocol).then(|| format!("{what}: protocol: {of}; expected the table's, {protocol}"))
+        };
+        for frame in &self.frames {
+            let at = format!("frames: `{}`", frame.name);
+            if frame.score.is_some() && frame.error.is_some() {
+                return Err(format!("{at}: a score and an error; expected one of them"));
+            }
+            let scores = frame.score.iter().chain(frame.fitted_score());
+            if let Some(problem) = scores.into_iter().find_map(|score| other(&at, &score.protocol)) {
+                return Err(problem);
+            }
+        }
+        for (what, summary) in [("summary", &self.summary), ("fitted", &self.fitted)] {
+            let Some(summary) = summary else { continue };
+            if let Some(problem) = other(what, &summary.protocol) {
+                return Err(problem);
+            }
+            let (frames, scored) = (summary.frames, self.scored() as u64);
+            if frames != scored {
+                return Err(format!("{what}: frames: {frames}; expected {scored}, which have scores"));
+            }
+        }
+        Ok(())
+    }
+
     /// Frames that were scored.
     pub fn scored(&self) -> usize {
         self.frames.iter().filter(|frame| frame.score.is_some()).count()

@@ -17,7 +17,7 @@ pub fn costs(results: &Results, records: &Records, measured: Option<&Costs>) -> 
         None => once.to_owned(),
         Some(Costs { frames, rounds, threads, .. }) => format!(
             "Posing and drawing: at most {frames} frames of a table, the median of {rounds} repeats, variants in alternating order, \
-             one frame at a time on {threads} threads. Scoring: once per frame, while other frames were drawn"
+             one frame at a time on {threads} threads"
         ),
     };
     let mut table = Table {
@@ -33,7 +33,6 @@ pub fn costs(results: &Results, records: &Records, measured: Option<&Costs>) -> 
             Column::new("visible", "Visible").digits(Digits::Decimals(0)).about("those that reach the image"),
             time("pose", "Pose, ms"),
             time("render", "Draw, ms"),
-            time("score", "Score, ms"),
         ],
         ..Table::new("costs", "Cost of a frame")
     };
@@ -91,7 +90,6 @@ fn cells(variants: &[&VariantResults], records: &Records) -> Option<Vec<Cell>> {
         number(&visible, Digits::Decimals(0)),
         ms(|s| s.pose),
         ms(|s| s.render),
-        ms(|s| s.score),
     ])
 }
 
@@ -146,7 +144,8 @@ pub fn phases(results: &Results, records: &Records) -> Option<Table> {
     let mut table = Table {
         sentences: vec![
             "Seconds, added over the threads. On a sequence a variant draws one avatar. Scoring holds what is drawn only to be \
-             scored, such as the frame before for metrics of motion"
+             scored, such as the frame before for metrics of motion; what of the truth every score needs is in that of the first \
+             variant"
                 .to_owned(),
         ],
         labels: vec![

@@ -114,9 +114,9 @@ fn describe_subject(
     dataset: &LoadedDataset,
     renders: &[PathBuf],
 ) -> Result<SubjectInfo, skinsplat_data::Error> {
-    let roles =
-        subject.train.iter().map(|s| (s, Role::Train)).chain(subject.test.iter().map(|s| (s, Role::Test)));
-    let sequences: Vec<(&Sequence, Role)> = roles.collect();
+    let parts = [(&subject.train, Role::Train), (&subject.test, Role::Test), (&subject.val, Role::Val)];
+    let sequences: Vec<(&Sequence, Role)> =
+        parts.into_iter().flat_map(|(part, role)| part.iter().map(move |s| (s, role))).collect();
     let describe = |&(sequence, role): &(&Sequence, Role)| {
         let frame =
             |f: &skinsplat_data::FrameRef| FrameInfo { name: f.name.clone(), time: f.time, camera: f.camera };

@@ -142,6 +142,19 @@ fn a_gap_leaves_the_page_and_its_pictures() {
     // A moving picture has all of its columns in every frame.
     assert_eq!(index["moving"][0]["frames"][0], 2, "{index}");
     assert!(desk.path("run/images/README.md").is_file());
+    // Pictures are the run's own, and of one size.
+    let page = || desk.run(args!["report", "run", "--format", "html", "--out", "q.html"]);
+    let kept = desk.read("run/pictures/index.json");
+    let pixel = skinsplat_core::scene::Image::filled(1, 1, [0.5; 3]);
+    skinsplat_data::frames::save_png(&desk.path("run/pictures/small.png"), &pixel).unwrap();
+    let truth = index["frames"][0]["truth"].as_str().unwrap();
+    for foreign in ["../../theirs/tiny/image_0000.png", "/etc/hostname"] {
+        desk.put("run/pictures/index.json", kept.replacen(truth, foreign, 1));
+        page().refuses(&["index.json", foreign, "in the folder"], foreign);
+    }
+    desk.put("run/pictures/index.json", kept.replacen(truth, "small.png", 1));
+    let said = page().exits(3, "another size");
+    assert!(said.err.contains("pixels; expected 1x1, as of the truth"), "{}", said.err);
 }
 
 /// A subject that cannot be read costs its own row, with the reason, and no other.

@@ -1,11 +1,11 @@
 //! What moved between two results documents.
 
 use super::made_up::{results, run, table_7, wide_table_7, with_holes};
-use skinsplat::experiment::{FittedOutcome, Outcome, Plan, PoseNoise, Records, Source};
+use skinsplat::experiment::{FittedOutcome, Outcome, Plan, PoseNoise, Profile, Records, Source};
 use skinsplat::report::compare::{
     Changes, Fate, Tolerances, Verdict, against_paper, compare, github, junit, markdown, text,
 };
-use skinsplat::report::{OLDEST_SCHEMA, Results, SCHEMA};
+use skinsplat::report::{OLDEST_SCHEMA, Results, SCHEMA, VariantResults};
 use skinsplat_metrics::MetricId;
 
 /// The made-up results with the PSNR of one frame of anna's quaternions moved.
@@ -88,6 +88,7 @@ fn a_single_frame_counts_where_its_own_tolerance_says_so() {
         (line.variant.as_str(), line.frames.as_slice()),
         ("quaternions", &["image_0003".to_owned()][..])
     );
+    assert!(github(&worse).contains("; in image_0003\n"), "{}", github(&worse));
 }
 
 /// What is missing is not worse, and what is left is compared over the frames that both have.
@@ -310,6 +311,73 @@ fn a_tolerance_takes_the_place_of_the_last_digit() {
     let with = |tolerance| against_paper(&base(), &Tolerances::each(|_| tolerance)).counts;
     assert_eq!((with(f64::INFINITY).regressed, with(f64::INFINITY).improved), (0, 0));
     assert_eq!(with(0.0).unchanged, 0, "no printed number is ours to the last bit");
+}
+
+#[test]
+fn less_than_what_is_printed_is_no_verdict_without_a_word() {
+    let any = Tolerances::each(|_| f64::INFINITY);
+    let edits: [(&dyn Fn(&mut Results), &str); 3] = [
+        (&|r| r.options.subset.limit = Some(1), "partial: only a part"),
+        (
+            &|r| r.options.profile = Profile::quick(),
+            "profile quick: at most 6 test frames per sequence, images",
+        ),
+        (
+            &|r| {
+                let frame = &mut r.tables[0].sequences[0].variants[0].frames[0];
+                (frame.score, frame.error) = (None, Some("gone".to_owned()));
+            },
+            "scores of frames are missing",
+        ),
+    ];
+    for (edit, expected) in edits {
+        let mut results = results(&table_7(), run);
+        edit(&mut results);
+        let changes = against_paper(&results, &any);
+        assert_eq!(changes.verdict, Verdict::Incomplete);
+        let noted = changes.notes.iter().any(|note| note.text.contains(expected));
+        assert!(noted, "{expected}: {:?}", changes.notes);
+    }
+}
+
+#[test]
+fn what_draws_otherwise_is_noted() {
+    let mut other = base();
+    (other.tables[0].resolution, other.tables[0].antialiased) = (Some(100), true);
+    let notes = by_default(&other).notes;
+    let texts: Vec<&str> = notes.iter().map(|note| note.text.as_str()).collect();
+    assert_eq!(
+        texts,
+        [
+            "table7: images as the profile has them in the baseline, of 100 pixels now",
+            "table7: the plain rasterizer drew in the baseline, the antialiased one now",
+        ]
+    );
+}
+
+#[test]
+fn results_that_contradict_themselves_are_refused() {
+    let edits: [(&dyn Fn(&mut VariantResults), &str); 4] = [
+        (&|v| v.frames[0].error = Some("gone".to_owned()), "a score and an error; expected one of them"),
+        (&|v| v.frames[1].frame = v.frames[0].frame, "frames: frame: `0` twice; expected each once"),
+        (&|v| v.summary.as_mut().unwrap().frames = 77, "summary: frames: 77; expected"),
+        (
+            &|v| v.frames[0].score.as_mut().unwrap().protocol.version += 1,
+            "protocol: avatar-v1@2; expected the table's, avatar-v1@1",
+        ),
+    ];
+    for (edit, expected) in edits {
+        let mut results = base();
+        edit(&mut results.tables[0].sequences[0].variants[0]);
+        let problem = Results::from_json(&results.to_json()).unwrap_err();
+        assert!(
+            problem.starts_with("table `table7`: sequences: `") && problem.contains(expected),
+            "{problem}"
+        );
+    }
+    let list = format!("[{}]", base().to_json());
+    let expected = "a list; expected an object, as reports/SCHEMA.md says";
+    assert_eq!(Results::from_json(&list).unwrap_err(), expected);
 }
 
 /// `matrices` is `m` of the paper's table 7.

@@ -66,6 +66,23 @@ fn stand_ins_are_of_the_right_kind_and_all_of_their_test_sequences_run() {
 }
 
 #[test]
+fn validation_sequences_are_scored_where_a_table_names_them_and_who_has_none_says_so() {
+    let mut data = figures();
+    data.subjects[0].sequences.push(sequence("val", Role::Val, 5));
+    data.subjects.push(subject("other", Capture::Monocular, data.subjects[0].sequences[..2].to_vec()));
+    let labels = |experiment: Experiment| -> Vec<(String, Option<String>)> {
+        let plan = planned(&[experiment], &[data.clone()]);
+        plan.tables[0].rows.iter().map(|row| (row.label.clone(), row.missing.clone())).collect()
+    };
+    let mut table = Experiment::embedded().remove(0);
+    let names: Vec<String> = labels(table.clone()).into_iter().map(|(label, _)| label).collect();
+    assert_eq!(names, ["mono / mono-twist", "mono / mono-squat", "other / mono-twist"]);
+    table.stand_in.as_mut().unwrap().test = vec!["val".to_owned()];
+    let missing = Some("`other` has no sequence val".to_owned());
+    assert_eq!(labels(table), [("mono / val".to_owned(), None), ("other".to_owned(), missing)]);
+}
+
+#[test]
 fn avatars_are_shared_by_tables_that_make_the_same_ones() {
     let plan = planned(&Experiment::embedded(), &[figures()]);
     let made: Vec<(&str, &str)> = plan
@@ -108,8 +125,8 @@ fn avatars_are_shared_by_tables_that_make_the_same_ones() {
     let starts: BTreeSet<String> = plan.avatars.iter().filter_map(start).collect();
     assert_eq!(
         starts.len(),
-        7,
-        "on mono's vertices and faces, on multi's vertices, on hands' faces and fitted surface; balls on mono's and multi's \
+        8,
+        "on mono's vertices, faces and samples, on multi's vertices, on hands' faces and fitted surface; balls on mono's and multi's \
          vertices"
     );
     let swap = Experiment::embedded_all().into_iter().filter(|experiment| experiment.id == "swap");

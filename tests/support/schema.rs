@@ -35,7 +35,13 @@ fn check(root: &Value, schema: &Value, value: &Value, at: &str) -> Result<(), St
             "minimum" if value.as_f64().is_some_and(|v| v < rule.as_f64().unwrap()) => {
                 return fail(format!("expected at least {rule}"));
             }
-            "minimum" => {}
+            "minItems" if value.as_array().is_some_and(|v| (v.len() as u64) < rule.as_u64().unwrap()) => {
+                return fail(format!("expected at least {rule} items"));
+            }
+            "maxItems" if value.as_array().is_some_and(|v| (v.len() as u64) > rule.as_u64().unwrap()) => {
+                return fail(format!("expected at most {rule} items"));
+            }
+            "minimum" | "minItems" | "maxItems" => {}
             "anyOf" => {
                 let tried: Vec<String> = rule
                     .as_array()

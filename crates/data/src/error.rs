@@ -147,7 +147,7 @@ pub fn read_bytes(path: &Path, field: &str, expected: &str) -> Result<Vec<u8>, E
 
 /// Reads a whole UTF-8 file, without the byte order mark that some editors put before it.
 pub fn read_text(path: &Path, field: &str, expected: &str) -> Result<String, Error> {
-    let bytes = read_bytes(path, field, expected)?;
+    let bytes = source::read_text(path).map_err(|cause| Error::read(path, field, expected, cause))?;
     if let Some(found) = disguise(&bytes) {
         return Err(Error::invalid(path, field, found, expected));
     }

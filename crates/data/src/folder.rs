@@ -8,7 +8,7 @@
 //! <subject>/gt_normal_offset.npy           clothing, (V) metres along the rest normals; see [`Options`]
 //! models/<model>                           in the subject's folder or one of the two above it (of a link: above either end)
 //! ```
-//! Sequences named `train*` are for fitting, those named `test*` for evaluation.
+//! Sequences named `train*` are for fitting, those named `test*` for evaluation, those named `val*` for choosing how to fit.
 
 use super::models::{Doubt, Gender, Models, ShapeFit};
 use super::poses::{self, PoseTrack};
@@ -43,6 +43,8 @@ pub struct Subject {
     pub train: Vec<Sequence>,
     /// Sequences to evaluate on, by name.
     pub test: Vec<Sequence>,
+    /// Sequences to choose settings on, by name: no table scores them unless it names them.
+    pub val: Vec<Sequence>,
     /// What was guessed, left out or not read, a sentence each.
     pub notes: Vec<String>,
     /// What its own files say that may spoil its numbers.
@@ -62,7 +64,7 @@ impl Subject {
             let names = sequence_folders(folder, prefix)?;
             names.iter().map(|name| load_sequence(&folder.join(name), name, &mut models)).collect()
         };
-        let (train, test) = (split("train")?, split("test")?);
+        let (train, test, val) = (split("train")?, split("test")?, split("val")?);
         let sequences = || train.iter().chain(&test);
         let cameras = sequences().map(|s| s.cameras.len()).max();
         let joints = sequences().map(|s| s.body.skeleton.num_joints()).max();
@@ -73,6 +75,7 @@ impl Subject {
             capture,
             train,
             test,
+            val,
             notes: models.notes().to_vec(),
             doubts: Vec::new(),
             shapes: Vec::new(),
@@ -82,7 +85,7 @@ impl Subject {
 
     /// All sequences, training first.
     pub fn sequences(&self) -> impl Iterator<Item = &Sequence> {
-        self.train.iter().chain(&self.test)
+        self.train.iter().chain(&self.test).chain(&self.val)
     }
 
     /// A sequence by name.

@@ -8,6 +8,9 @@ use std::path::Path;
 /// What a stream may deliver: it has no length of its own, and some never end.
 const MAX_STREAM: u64 = 1 << 32;
 
+/// What a file of text may hold: no list of frames, table or mesh is as long.
+const MAX_TEXT: u64 = 1 << 30;
+
 /// Folders of streams that are open already.
 const STREAMS: [&str; 3] = ["/dev/stdin", "/dev/fd", "/proc/self/fd"];
 
@@ -29,13 +32,31 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// # Errors
 /// As [`open`]; a stream without an end within 4 GiB.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    read_at_most(path, None)
+}
+
+/// Reads the bytes of a whole file of text.
+///
+/// # Errors
+/// As [`read`]; more than 1 GiB.
+pub(crate) fn read_text(path: &Path) -> io::Result<Vec<u8>> {
+    read_at_most(path, Some(MAX_TEXT))
+}
+
+fn read_at_most(path: &Path, most: Option<u64>) -> io::Result<Vec<u8>> {
+    let too_large = |most: u64| {
+        let problem = format!("more than {} GiB", most >> 30);
+        io::Error::new(io::ErrorKind::FileTooLarge, problem)
+    };
     let mut file = open(path)?;
     let about = file.metadata()?;
+    if let Some(most) = most.filter(|&most| about.len() > most) {
+        return Err(too_large(most));
+    }
     let mut bytes = Vec::with_capacity(usize::try_from(about.len()).unwrap_or(0));
-    if about.is_file() {
-        file.read_to_end(&mut bytes)?;
-    } else if (&mut file).take(MAX_STREAM).read_to_end(&mut bytes)? as u64 == MAX_STREAM {
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "no end within 4 GiB"));
+    let most = most.unwrap_or(if about.is_file() { u64::MAX } else { MAX_STREAM });
+    if (&mut file).take(most).read_to_end(&mut bytes)? as u64 == most {
+        return Err(too_large(most));
     }
     Ok(bytes)
 }
@@ -43,9 +64,9 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
 /// Reads a whole UTF-8 file.
 ///
 /// # Errors
-/// As [`read`]; bytes that are no UTF-8.
+/// As [`read`]; more than 1 GiB, bytes that are no UTF-8.
 pub fn read_to_string(path: &Path) -> io::Result<String> {
-    String::from_utf8(read(path)?)
+    String::from_utf8(read_text(path)?)
         .map_err(|cause| io::Error::new(io::ErrorKind::InvalidData, cause.to_string()))
 }
 
@@ -70,6 +91,9 @@ mod tests {
         std::fs::write(&path, [0xff]).unwrap();
         assert_eq!(read_to_string(&path).unwrap_err().kind(), io::ErrorKind::InvalidData);
         assert!(open(folder.path()).unwrap_err().to_string().contains("a folder"));
+        // Without its bytes on the disk, and none of them read.
+        File::create(&path).unwrap().set_len(1 << 40).unwrap();
+        assert_eq!(read_to_string(&path).unwrap_err().to_string(), "more than 1 GiB");
     }
 
     #[cfg(unix)]

@@ -118,6 +118,8 @@ pub fn escape(text: &str) -> String {
             // A link or an image.
             ']' if after == '(' => escaped += "\\]",
             '<' => escaped += "&lt;",
+            // An entity.
+            '&' if after == '#' || after.is_ascii_alphabetic() => escaped += "\\&",
             c => escaped.push(c),
         }
         before = c;
@@ -133,6 +135,7 @@ mod tests {
     fn markup_in_names_is_shown_not_obeyed() {
         assert_eq!(escape("a|b*c`<d>\n"), "a\\|b\\*c\\`&lt;d> ");
         assert_eq!(escape("_a_ image_0001 ![x](y) [0, 1]"), "\\_a\\_ image_0001 ![x\\](y) [0, 1]");
+        assert_eq!(escape("a & b&amp;c &#38;"), "a & b\\&amp;c \\&#38;");
         assert_eq!(prose("`power-N|*` of *"), "`power-N|*` of \\*");
     }
 

@@ -1,7 +1,7 @@
 //! Real data against the numbers that the paper prints.
 
 use super::{Changes, Fate, Line, Note, Tolerances};
-use crate::experiment::Source;
+use crate::experiment::{Options, Source};
 use crate::report::results::{Results, TableResults, VariantResults};
 use skinsplat_metrics::MetricId;
 use skinsplat_table::{Cell, Column, Row, RowKind, Table};
@@ -28,7 +28,34 @@ pub fn against_paper(results: &Results, tolerances: &Tolerances) -> Changes {
         let text = "no table has printed numbers: not judged".to_owned();
         changes.notes.push(Note { left_out: true, text });
     }
+    changes.notes.extend(less_than_printed(results));
     changes.finish()
+}
+
+/// What keeps the results from being of all that the paper's are of.
+fn less_than_printed(results: &Results) -> Vec<Note> {
+    let mut notes = Vec::new();
+    let mut say = |text: String| notes.push(Note { left_out: true, text });
+    let Options { profile, subset, .. } = &results.options;
+    if !subset.is_everything() {
+        say("partial: only a part of the data was asked for".to_owned());
+    }
+    let bounds = [
+        profile.max_test_frames.map(|n| format!("at most {n} test frames per sequence")),
+        profile.resolution.map(|side| format!("images of at most {side} pixels")),
+    ];
+    let bounds: Vec<String> = bounds.into_iter().flatten().collect();
+    if !bounds.is_empty() {
+        say(format!("profile {}: {}; the printed numbers are of all", profile.id, bounds.join(", ")));
+    }
+    for table in results.tables.iter().filter(|table| table.source == Source::Own && table.paper.is_some()) {
+        let variants = table.sequences.iter().flat_map(|sequence| &sequence.variants);
+        let missing: usize = variants.map(VariantResults::missing).sum();
+        if missing > 0 {
+            say(format!("{}: {missing} scores of frames are missing", table.experiment));
+        }
+    }
+    notes
 }
 
 fn not_judged(table: &TableResults, why: &str) -> Note {

@@ -161,6 +161,17 @@ fn other_ways(table: &TableResults, other: &TableResults) -> Vec<String> {
         let differ = "test poses are fitted with other options than in the baseline (`test_pose`)";
         ways.push(format!("{at}: {differ}"));
     }
+    if table.resolution != other.resolution {
+        let [before, now] = [table, other].map(|of| match of.resolution {
+            Some(side) => format!("of {side} pixels"),
+            None => "as the profile has them".to_owned(),
+        });
+        ways.push(format!("{at}: images {before} in the baseline, {now} now"));
+    }
+    if table.antialiased != other.antialiased {
+        let [before, now] = [table, other].map(|of| if of.antialiased { "antialiased" } else { "plain" });
+        ways.push(format!("{at}: the {before} rasterizer drew in the baseline, the {now} one now"));
+    }
     let now: BTreeMap<&str, &VariantResults> = other
         .sequences
         .iter()

@@ -56,12 +56,7 @@ fn message(line: &Line) -> String {
     let numbers =
         format!("{} {} -> {}", line.title(), shown(line.baseline, before), shown(line.current, after));
     let tolerance = line.tolerance.map_or_else(String::new, |t| format!(" (tolerance {t})"));
-    format!("{at}: {numbers}{tolerance}{}", frames(line))
-}
-
-/// The frames behind a movement.
-fn frames(line: &Line) -> String {
-    if line.moved.is_empty() { String::new() } else { format!("; most in {}", line.moved.join(", ")) }
+    format!("{at}: {numbers}{tolerance}{}", line.behind())
 }
 
 /// A workflow command: what it says ends no line, starts no other command and moves no cursor.

@@ -68,5 +68,6 @@ fn numbers(line: &Line) -> String {
     };
     let (before, after) = (line.digits_before(metric), finer(metric));
     let tolerance = line.tolerance.unwrap_or_default();
-    format!("{} -> {} (tolerance {tolerance})", shown(line.baseline, before), shown(line.current, after))
+    let numbers = [shown(line.baseline, before), shown(line.current, after)].join(" -> ");
+    format!("{numbers} (tolerance {tolerance}){}", line.behind())
 }

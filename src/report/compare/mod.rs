@@ -174,6 +174,15 @@ impl Line {
         self.printed.map_or_else(|| tables::finer(metric), Digits::Decimals)
     }
 
+    /// The frame that it is about, or those behind its movement.
+    pub(super) fn behind(&self) -> String {
+        match (self.frames.as_slice(), self.moved.as_slice()) {
+            ([], []) => String::new(),
+            ([], moved) => format!("; most in {}", moved.join(", ")),
+            (frames, _) => format!("; in {}", frames.join(", ")),
+        }
+    }
+
     /// What its number is called.
     pub(super) fn title(&self) -> String {
         titled(self.metric.map_or("all", MetricId::title), self.fitted)

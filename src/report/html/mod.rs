@@ -51,7 +51,10 @@ pub fn html(results: &Results, extras: &Extras) -> String {
     while html.len() > extras.bound && budget.shrink() {
         html = self::page(results, extras, &budget).html();
     }
-    html
+    match html.len() > extras.bound {
+        true => self::page(results, extras, &budget.over()).html(),
+        false => html,
+    }
 }
 
 /// Of how many of `kept` frames a page can show pictures, as far as a few of them tell: those among the extras, which stand for

@@ -84,6 +84,8 @@ pub(super) struct Budget {
     moving: usize,
     /// How many times charts have half of their points.
     thinned: u32,
+    /// Whether the page is too large without any of them.
+    over: bool,
 }
 
 /// Longer sides, the largest first.
@@ -98,7 +100,13 @@ impl Budget {
             kept: pictures.kept.max(pictures.stills.len()),
             moving: pictures.moving.len(),
             thinned: 0,
+            over: false,
         }
+    }
+
+    /// For a page whose tables alone are beyond its bound.
+    pub(super) fn over(self) -> Self {
+        Self { over: true, ..self }
     }
 
     /// No picture.
@@ -141,12 +149,18 @@ impl Budget {
             let megabytes = bound as f64 / 1e6;
             format!("Charts have fewer points, so that the page stays below {megabytes} MB; they say which.")
         });
-        self.says_of_pictures(bound).into_iter().chain(thinned).collect()
+        let over = self.over.then(|| {
+            let megabytes = bound as f64 / 1e6;
+            format!("The page is larger than {megabytes} MB by its tables alone.")
+        });
+        self.says_of_pictures(bound).into_iter().chain(thinned).chain(over).collect()
     }
 
     fn says_of_pictures(&self, bound: usize) -> Option<String> {
         let megabytes = bound as f64 / 1e6;
-        if self.frames < self.kept {
+        if self.kept == 0 {
+            None
+        } else if self.frames < self.kept {
             let (frames, of) = (self.frames, self.kept);
             Some(format!(
                 "Pictures of {frames} of the {of} frames that the run kept, so that the page stays below {megabytes} MB."

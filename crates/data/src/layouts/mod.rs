@@ -54,7 +54,7 @@ pub struct Request<'a> {
 pub const LAYOUTS: &[Layout] = &[
     Layout {
         id: "folder",
-        summary: "sequences train* and test*, each with transforms.json; exact numbers in cameras.npz and poses.npz",
+        summary: "sequences train*, test* and perhaps val*, each with transforms.json; exact numbers in cameras.npz and poses.npz",
         parts: &[],
         load: |request| Subject::load(request.folder, request.options),
     },
@@ -96,6 +96,7 @@ impl Request<'_> {
             capture,
             train,
             test,
+            val: Vec::new(),
             notes,
             doubts: Vec::new(),
             shapes: Vec::new(),

@@ -270,8 +270,11 @@ pub struct Densify {
     pub from: f32,
     /// Share of the iterations after the last one.
     pub until: f32,
-    /// Number of changes in between.
+    /// Number of changes in between, or more where `interval` says so.
     pub rounds: u32,
+    /// In fits that are long enough, a change every so many iterations; 0: `rounds` whatever their length.
+    #[serde(default, skip_serializing_if = "defaults::is_zero")]
+    pub interval: u32,
     /// Gaussians whose mean gradient on screen (per half image) is larger are cloned or split.
     pub gradient: f32,
     /// Gaussians with a standard deviation above this are split, others cloned, metres.
@@ -297,6 +300,10 @@ pub struct Densify {
 mod defaults {
     pub(super) fn one() -> f32 {
         1.0
+    }
+
+    pub(super) fn is_zero(value: &u32) -> bool {
+        *value == 0
     }
 
     pub(super) fn is_one(value: &f32) -> bool {

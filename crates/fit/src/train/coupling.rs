@@ -133,12 +133,7 @@ impl Coupled {
 
     /// Half the sum of `weight` times the squared differences over all rows and their neighbours, each pair seen from either side: what
     /// has changed about each Gaussian in a table with a row each, its derivative added in another.
-    fn group(
-        &self,
-        weight: f32,
-        changes: (&[f32], Columns),
-        (gradient, into): (&mut [f32], Columns),
-    ) -> f64 {
+    fn group(&self, weight: f32, changes: (&[f32], Columns), (gradient, into): (&mut [f32], Columns)) -> f64 {
         let parts = gradient.par_chunks_mut(PART * into.stride).enumerate();
         let sums: Vec<f64> = parts
             .map(|(part, gradient)| {
@@ -169,7 +164,8 @@ impl pulp::NullaryFnOnce for Part<'_> {
 
     #[inline(always)]
     fn call(self) -> f64 {
-        let Self { neighbours, first, weight, changes: (changes, columns), gradient: (gradient, into) } = self;
+        let Self { neighbours, first, weight, changes: (changes, columns), gradient: (gradient, into) } =
+            self;
         let mut lanes = [0.0; LANES];
         for row in 0..gradient.len() / into.stride {
             let (i, out) = (first + row, into.of_mut(gradient, row));

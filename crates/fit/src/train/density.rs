@@ -50,8 +50,11 @@ impl Density {
 
 /// True if the number of Gaussians changes after this many iterations.
 pub(super) fn is_due(settings: &Densify, done: u32, iterations: u32) -> bool {
-    let share = f64::from(settings.until - settings.from) / f64::from(settings.rounds.max(1));
-    (0..settings.rounds).any(|round| {
+    let share = f64::from(settings.until - settings.from);
+    let spaced = (share * f64::from(iterations)) as u32 / settings.interval.max(1);
+    let rounds = if settings.interval == 0 { settings.rounds } else { settings.rounds.max(spaced) };
+    let share = share / f64::from(rounds.max(1));
+    (0..rounds).any(|round| {
         let at = f64::from(settings.from) + share * f64::from(round);
         (at * f64::from(iterations)).round() as u32 == done
     })
@@ -209,6 +212,7 @@ mod tests {
             prune_opacity: 0.1,
             most: 2.0,
             walk: false,
+            interval: 0,
             ..crate::recipe::RECIPES
                 .iter()
                 .find_map(|recipe| recipe.densify.clone())
@@ -216,5 +220,8 @@ mod tests {
         };
         let due: Vec<u32> = (0..=100).filter(|&done| is_due(&settings, done, 100)).collect();
         assert_eq!(due, [20, 40, 60]);
+        let spaced = Densify { interval: 10, ..settings };
+        let count = |of: u32| (0..=of).filter(|&done| is_due(&spaced, done, of)).count();
+        assert_eq!([count(40), count(100)], [3, 6]);
     }
 }
