@@ -4,7 +4,7 @@ use super::Context;
 use anyhow::{Context as _, Result, anyhow, bail};
 use image::RgbImage;
 use skinsplat::experiment::Records;
-use skinsplat::report::html::{BOUND, Extras, KeptPictures, MovingPicture, Stills, frames_that_fit, html};
+use skinsplat::report::html::{Extras, KeptPictures, MovingPicture, Stills, frames_that_fit, html};
 use skinsplat::report::timing;
 use skinsplat::report::{Results, check_curves};
 use skinsplat::run::costs::{self, Costs};
@@ -40,13 +40,19 @@ impl Images {
 /// Folder, inside the run's, of the pictures that its page shows.
 pub(super) const PICTURES: &str = "pictures";
 
-/// The page of a run as HTML: its results with what lies in its folder. Without a folder there is nothing but the results.
+/// The page of a run as HTML, of at most `bound` bytes: its results with what lies in its folder. Without a folder there is nothing but the results.
 ///
 /// Frames with a picture that is gone or broken are shown without pictures, and a line says so.
 ///
 /// # Errors
 /// Records that cannot be read; the message names the file.
-pub(super) fn page(results: &Results, folder: &Path, images: Images, context: Context) -> Result<String> {
+pub(super) fn page(
+    results: &Results,
+    folder: &Path,
+    images: Images,
+    bound: usize,
+    context: Context,
+) -> Result<String> {
     let curves = curves(&folder.join("curves.csv"))?;
     let stores = store::stores(folder)?;
     let records = store::merge(stores.iter().map(std::path::PathBuf::as_path))?;
@@ -58,8 +64,7 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images, context: Co
     let tables = timing::costs(results, &records, measured.as_ref()).into_iter().collect();
     let absent = absent(results, folder, &records, curves.is_empty());
     let bends = records.into_values().filter_map(|record| Some((record.key, record.bend?))).collect();
-    let mut extras =
-        Extras { pictures: KeptPictures::default(), bends, curves, tables, absent, bound: BOUND };
+    let mut extras = Extras { pictures: KeptPictures::default(), bends, curves, tables, absent, bound };
     let pictures = folder.join(PICTURES);
     let Some(mut index) = index(&pictures, images)? else { return Ok(html(results, &extras)) };
     // The run may have tables that the page has not.
@@ -92,9 +97,9 @@ pub(super) fn page(results: &Results, folder: &Path, images: Images, context: Co
 const FEW: usize = 32;
 
 /// Writes a page and says how large it is.
-pub(super) fn write_page(path: &Path, html: &str, context: Context) -> Result<()> {
+pub(super) fn write_page(path: &Path, html: &str, bound: usize, context: Context) -> Result<()> {
     atomic::write(path, |w| w.write_all(html.as_bytes()))?;
-    let over = if html.len() > BOUND { ", beyond its bound by its tables alone" } else { "" };
+    let over = if html.len() > bound { ", beyond its bound by its tables alone" } else { "" };
     context.note(format!("{}: {:.1} MB{over}", path.display(), html.len() as f64 / 1e6));
     Ok(())
 }

@@ -9,6 +9,7 @@ use super::{Context, Exit};
 use anyhow::{Result, bail};
 use clap::Arg;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use skinsplat::report::html::BOUND;
 use skinsplat::report::{self, Results};
 use skinsplat::run::provenance::Phases;
 use skinsplat::run::store;
@@ -33,6 +34,9 @@ pub(super) struct Report {
     /// Which of the pictures that the run kept (`run --images`) a page (--format html) shows [default: all]
     #[arg(long, value_enum, value_name = "WHICH")]
     images: Option<Images>,
+    /// Megabytes that a page (--format html) stays below: pictures get smaller, then fewer [default: 15]
+    #[arg(long, value_name = "MB", value_parser = megabytes)]
+    page_mb: Option<f64>,
     /// Where the time went, instead of the tables: plan, avatars and frames of the last call, posing, drawing and scoring
     #[arg(long, conflicts_with = "baseline")]
     timing: bool,
@@ -64,8 +68,9 @@ Examples:
 impl Report {
     pub(super) fn run(&self, context: Context) -> Result<Exit> {
         let tables: Vec<String> = self.table.iter().cloned().collect();
-        if self.images.is_some() && self.format(MARKDOWN) != HTML {
-            bail!("--images without --format html; expected a page, which alone has pictures");
+        let of_pages = [("--images", self.images.is_some()), ("--page-mb", self.page_mb.is_some())];
+        if let Some((name, _)) = of_pages.iter().find(|(_, given)| *given && self.format(MARKDOWN) != HTML) {
+            bail!("{name} without --format html; expected a page, which alone has pictures");
         }
         self.out.iter().try_for_each(|path| apart(path, [self.run.as_path(), folder(&self.run)]))?;
         let results = load(&self.run)?;
@@ -84,11 +89,16 @@ impl Report {
         let text =
             if self.timing { self.timing(&results, context)? } else { self.tables(&results, context)? };
         match &self.out {
-            Some(path) if self.format(MARKDOWN) == HTML => write_page(path, &text, context)?,
+            Some(path) if self.format(MARKDOWN) == HTML => write_page(path, &text, self.bound(), context)?,
             Some(path) => save(path, &text)?,
             None => emit(&text)?,
         }
         Ok(if results.missing() > 0 { Exit::Incomplete } else { Exit::Success })
+    }
+
+    /// Most bytes of a page.
+    fn bound(&self) -> usize {
+        self.page_mb.map_or(BOUND, |megabytes| (1e6 * megabytes) as usize)
     }
 
     /// The wanted format.
@@ -99,7 +109,10 @@ impl Report {
     /// The tables in the wanted format.
     fn tables(&self, results: &Results, context: Context) -> Result<String> {
         Ok(match self.format(MARKDOWN) {
-            HTML => page(results, folder(&self.run), self.images.unwrap_or(Images::All), context)?,
+            HTML => {
+                let images = self.images.unwrap_or(Images::All);
+                page(results, folder(&self.run), images, self.bound(), context)?
+            }
             format => printed(results, format),
         })
     }
@@ -141,6 +154,13 @@ impl Report {
 #[derive(serde::Deserialize)]
 struct Timed {
     phases: Option<Phases>,
+}
+
+fn megabytes(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a number above 0".to_owned()),
+    }
 }
 
 /// The format of pages, beside those of tables.

@@ -11,6 +11,7 @@ use super::selection::read_json;
 use super::{Context, Exit, progress::Watch};
 use anyhow::{Context as _, Result};
 use skinsplat::experiment::{Job, Records, Shard, Unreadable};
+use skinsplat::report::html::BOUND;
 use skinsplat::report::{self, Results, TableResults};
 use skinsplat::run::motion::{self, Motion};
 use skinsplat::run::pictures;
@@ -309,7 +310,7 @@ impl Run {
         let costs = costs::measure(plan, library, &self.out.join(AVATARS), &|event| watch.see(event))?;
         drop(watch);
         write_text(&self.out.join(costs::FILE_NAME), &(serde_json::to_string_pretty(&costs)? + "\n"))?;
-        write_page(path, &page(results, &self.out, images, context)?, context)
+        write_page(path, &page(results, &self.out, images, BOUND, context)?, BOUND, context)
     }
 
     fn write_motion(

@@ -349,9 +349,11 @@ fn a_run_is_one_page() {
     );
     let none = page(args!["report", "run", "--format", "html", "--images", "none", "--out", "page.html"]);
     assert!(none.len() < with.len() && !none.contains("data:image/jpeg"));
-    for format in [&["--images", "none"][..], &["--images", "key", "--format", "csv"]] {
+    let small = page(args!["report", "run", "--format", "html", "--page-mb", "0.1", "--out", "page.html"]);
+    assert!(small.len() < with.len() && small.contains("stays below 0.1 MB"), "{}", small.len());
+    for format in [&["--images", "none"][..], &["--images", "key", "--format", "csv"], &["--page-mb", "3"]] {
         let report = args!["report", "run"].into_iter().chain(format.iter().map(std::ffi::OsString::from));
-        desk.run(report.collect()).refuses(&["--images", "--format html"], "no page");
+        desk.run(report.collect()).refuses(&[format[0], "--format html"], "no page");
     }
     desk.run(args!["run", "tiny.toml", "--images", "some"])
         .refuses(&["some", "none, key, all"], "no such choice");

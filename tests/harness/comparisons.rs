@@ -8,6 +8,9 @@ use skinsplat::report::compare::{
 use skinsplat::report::{OLDEST_SCHEMA, Results, SCHEMA, VariantResults};
 use skinsplat_metrics::MetricId;
 
+/// Something done to results, and what is said of it.
+type Edit<'e, T> = (&'e dyn Fn(&mut T), &'e str);
+
 /// The made-up results with the PSNR of one frame of anna's quaternions moved.
 fn moved(by: f64) -> Results {
     results(&table_7(), |plan| {
@@ -316,7 +319,7 @@ fn a_tolerance_takes_the_place_of_the_last_digit() {
 #[test]
 fn less_than_what_is_printed_is_no_verdict_without_a_word() {
     let any = Tolerances::each(|_| f64::INFINITY);
-    let edits: [(&dyn Fn(&mut Results), &str); 3] = [
+    let edits: [Edit<'_, Results>; 3] = [
         (&|r| r.options.subset.limit = Some(1), "partial: only a part"),
         (
             &|r| r.options.profile = Profile::quick(),
@@ -357,7 +360,7 @@ fn what_draws_otherwise_is_noted() {
 
 #[test]
 fn results_that_contradict_themselves_are_refused() {
-    let edits: [(&dyn Fn(&mut VariantResults), &str); 4] = [
+    let edits: [Edit<'_, VariantResults>; 4] = [
         (&|v| v.frames[0].error = Some("gone".to_owned()), "a score and an error; expected one of them"),
         (&|v| v.frames[1].frame = v.frames[0].frame, "frames: frame: `0` twice; expected each once"),
         (&|v| v.summary.as_mut().unwrap().frames = 77, "summary: frames: 77; expected"),
