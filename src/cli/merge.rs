@@ -4,9 +4,11 @@ use super::output::emit;
 use super::products::{
     Printed, make_folder, printed, verdict, write_bend, write_curves, write_results, write_text,
 };
+use super::selection::read_json;
 use super::{Context, Exit};
 use anyhow::{Result, bail};
-use skinsplat::experiment::{CodeVersions, FrameRecord};
+use serde_json::Value;
+use skinsplat::experiment::{CodeVersions, FrameRecord, Shard};
 use skinsplat::report;
 use skinsplat::run::merge::{self, Disagreement, Merged, Missing, Source};
 use skinsplat::run::store::{self, FILE_NAME};
@@ -52,7 +54,16 @@ struct MergeReport<'a> {
     code: CodeVersions,
     plan: &'a str,
     machine: Machine,
-    merged: &'a [Source],
+    merged: Vec<Slice<'a>>,
+}
+
+/// A store, and who computed what it holds.
+#[derive(Debug, serde::Serialize)]
+struct Slice<'a> {
+    #[serde(flatten)]
+    source: &'a Source,
+    /// What the run said of itself; nothing where it did not end, or was one of an earlier program.
+    run: Option<Value>,
 }
 
 impl Merge {
@@ -138,8 +149,17 @@ fn report_of(merged: &Merged) -> MergeReport<'_> {
         code: CodeVersions::CURRENT,
         plan: &merged.file.plan.digest,
         machine: Machine::here(),
-        merged: &merged.sources,
+        merged: merged.sources.iter().map(|source| Slice { source, run: run_of(source) }).collect(),
     }
+}
+
+/// What the run that wrote a store said of itself.
+fn run_of(source: &Source) -> Option<Value> {
+    let store = Path::new(&source.store);
+    let file = source.shard.map_or_else(|| "run.json".to_owned(), Shard::provenance_name);
+    let said: Value = read_json(&store.with_file_name(file)).ok()?;
+    // A merge says nothing of its own.
+    said.get("phases").is_some().then_some(said)
 }
 
 fn line_of(Missing { label, shard, problem }: &Missing) -> String {

@@ -9,11 +9,12 @@ use super::{Context, Exit};
 use anyhow::{Result, bail};
 use clap::Arg;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use skinsplat::experiment::Shard;
 use skinsplat::report::html::BOUND;
 use skinsplat::report::{self, Results};
 use skinsplat::run::provenance::Phases;
 use skinsplat::run::store;
-use skinsplat_table::{FORMATS, to_json};
+use skinsplat_table::{FORMATS, Table, to_json};
 use std::path::PathBuf;
 
 /// Print the tables of a run again.
@@ -128,14 +129,11 @@ impl Report {
         let mut tables: Vec<_> = report::timing::phases(results, &records).into_iter().collect();
         let path = folder(&self.run).join("run.json");
         let run: Option<Timed> = path.is_file().then(|| read_json(&path)).transpose()?;
-        match run.and_then(|run| run.phases) {
-            Some(phases) => tables.insert(0, report::timing::calls(&phases)),
-            None if tables.is_empty() => {}
-            None => context.note(format!(
-                "{}: no times of avatars: a run that did not end, or slices that were merged",
-                path.display()
-            )),
+        let calls: Vec<_> = run.iter().flat_map(Timed::calls).collect();
+        if calls.is_empty() && !tables.is_empty() {
+            context.note(format!("{}: no times of avatars: a run that did not end", path.display()));
         }
+        tables.splice(..0, calls);
         if tables.is_empty() {
             bail!(
                 "{}: no recorded times; expected the folder of a run, with its {} or run.json",
@@ -154,6 +152,29 @@ impl Report {
 #[derive(serde::Deserialize)]
 struct Timed {
     phases: Option<Phases>,
+    /// The slices of a merge.
+    #[serde(default)]
+    merged: Vec<Slice>,
+}
+
+#[derive(serde::Deserialize)]
+struct Slice {
+    shard: Option<Shard>,
+    run: Option<Box<Timed>>,
+}
+
+impl Timed {
+    /// The calls that made a run, a table each.
+    fn calls(&self) -> Vec<Table> {
+        let of_slice = |slice: &Slice| {
+            let phases = slice.run.as_ref()?.phases.as_ref()?;
+            let mut table = report::timing::calls(phases);
+            table.title = slice.shard.map_or(table.title, |shard| format!("The last call of slice {shard}"));
+            Some(table)
+        };
+        let own = self.phases.iter().map(report::timing::calls);
+        own.chain(self.merged.iter().filter_map(of_slice)).collect()
+    }
 }
 
 fn megabytes(text: &str) -> Result<f64, String> {

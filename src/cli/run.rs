@@ -142,8 +142,10 @@ impl Run {
         }
         provenance.frames_planned = planned.plan.jobs.len();
         provenance.seconds = start.elapsed().as_secs_f64();
+        let said = serde_json::to_string_pretty(&provenance)? + "\n";
+        write_text(&self.out.join(self.provenance_name()), &said)?;
         match results {
-            Some(results) => self.write(&planned, &results, motion.as_ref(), &provenance, context),
+            Some(results) => self.write(&planned, &results, motion.as_ref(), context, provenance.seconds),
             None => self.verdict_of_shard(&planned, context),
         }
     }
@@ -227,7 +229,7 @@ impl Run {
             phases: Phases,
         }
         // What cannot be read, of an older program or cut short, is about to be replaced.
-        let earlier: Earlier = read_json(&self.out.join("run.json")).ok()?;
+        let earlier: Earlier = read_json(&self.out.join(self.provenance_name())).ok()?;
         (earlier.plan == plan).then_some(earlier.phases)
     }
 
@@ -236,20 +238,24 @@ impl Run {
         self.shard.map_or_else(|| FILE_NAME.to_owned(), Shard::file_name)
     }
 
+    /// Name of the file that says who computed.
+    fn provenance_name(&self) -> String {
+        self.shard.map_or_else(|| "run.json".to_owned(), Shard::provenance_name)
+    }
+
     /// The files of the tables, and what goes with them.
     fn write(
         &self,
         planned: &Planned,
         results: &Results,
         motion: Option<&Motion>,
-        provenance: &Provenance,
         context: Context,
+        seconds: f64,
     ) -> Result<Exit> {
         let records = self.records()?;
         write_results(&self.out, results)?;
         write_curves(&self.out, &planned.plan, &planned.experiments, std::slice::from_ref(&self.out))?;
         write_bend(&self.out, results)?;
-        write_text(&self.out.join("run.json"), &(serde_json::to_string_pretty(provenance)? + "\n"))?;
         if self.images.is_some_and(|which| which != Images::None) {
             self.write_images(planned, &records, context)?;
         }
@@ -263,7 +269,7 @@ impl Run {
             _ => {}
         }
         let out = self.out.display();
-        context.note(format!("{out}: tables.md, results.json and more, in {:.1} s", provenance.seconds));
+        context.note(format!("{out}: tables.md, results.json and more, in {seconds:.1} s"));
         let missing = results.missing();
         if missing > 0 {
             context.note(format!("{missing} scores are missing; {out}/{FILE_NAME} says why"));

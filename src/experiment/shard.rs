@@ -50,6 +50,11 @@ impl Shard {
         format!("shard-{:02}-of-{:02}.jsonl", self.index, self.count)
     }
 
+    /// Name of the file that says who computed the shard's results.
+    pub fn provenance_name(self) -> String {
+        format!("shard-{:02}-of-{:02}.json", self.index, self.count)
+    }
+
     /// The shard whose results file has this name; none if it is the name of something else.
     pub fn of_file_name(name: &str) -> Option<Self> {
         let (index, count) = name.strip_prefix("shard-")?.strip_suffix(".jsonl")?.split_once("-of-")?;

@@ -77,6 +77,13 @@ fn what_is_missing_is_listed_with_its_slice() {
     let image = desk.bytes("data/tiny/test_b/images/image_0001.png");
     shard(&desk, "run", "2/2", &[]).exits(0, "the other");
     desk.run(args!["merge", "run"]).exits(0, "both");
+    // Who computed what, and where the time went, is that of the slices.
+    let said: serde_json::Value = serde_json::from_str(&desk.read("run/run.json")).unwrap();
+    for (slice, name) in said["merged"].as_array().unwrap().iter().zip(["1/2", "2/2"]) {
+        assert_eq!((&slice["shard"], slice["run"]["binary"].as_str().unwrap().len()), (&name.into(), 64));
+    }
+    let timing = desk.ok(args!["report", "run", "--timing"]);
+    assert!(["1/2", "2/2"].iter().all(|slice| timing.contains(&format!("The last call of slice {slice}"))));
     // A slice whose frames fail says so itself, and the merge why.
     desk.put("data/tiny/test_b/images/image_0001.png", &image[..image.len() / 2]);
     shard(&desk, "damaged", "1/1", &[]).exits(3, "a damaged frame");
