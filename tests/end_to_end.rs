@@ -151,9 +151,10 @@ fn a_killed_run_goes_on_where_it_stopped() {
     );
 }
 
-/// What a run leaves for its reader: everything but what it works with.
+/// What a run leaves for its reader: everything but what it works with, slices included.
 fn shown(desk: &Desk, out: &str) -> Vec<(String, Vec<u8>)> {
-    let works_with = |name: &str| name.starts_with("avatars") || name.starts_with("plan-");
+    let works_with =
+        |name: &str| ["avatars", "plan-", "shard-"].iter().any(|working| name.starts_with(working));
     products(desk, out).into_iter().filter(|(name, _)| !works_with(name)).collect()
 }
 
