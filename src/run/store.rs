@@ -222,9 +222,16 @@ impl Drop for Locked {
     }
 }
 
+/// Most bytes of a store: some million records.
+const MOST: u64 = 1 << 32;
+
 /// The bytes of a regular file. A device can neither be cut off nor read to its end.
 fn whole(file: &mut File) -> io::Result<Vec<u8>> {
-    refuse_devices(&file.metadata()?)?;
+    let metadata = file.metadata()?;
+    refuse_devices(&metadata)?;
+    if metadata.len() > MOST {
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "more than 4 GiB"));
+    }
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes)?;
     Ok(bytes)

@@ -55,7 +55,7 @@ fn read_at_most(path: &Path, most: Option<u64>) -> io::Result<Vec<u8>> {
     }
     let mut bytes = Vec::with_capacity(usize::try_from(about.len()).unwrap_or(0));
     let most = most.unwrap_or(if about.is_file() { u64::MAX } else { MAX_STREAM });
-    if (&mut file).take(most).read_to_end(&mut bytes)? as u64 == most {
+    if (&mut file).take(most.saturating_add(1)).read_to_end(&mut bytes)? as u64 > most {
         return Err(too_large(most));
     }
     Ok(bytes)
